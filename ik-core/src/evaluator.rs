@@ -1,0 +1,154 @@
+//! The only door from a method to kinematics, with the meter that is budget and counter in one.
+
+use crate::kinematics::second_order::SecondOrder;
+use crate::kinematics::{Page, forward};
+use crate::problem::{PhaseId, Problem};
+use crate::robot::Robot;
+use crate::rows::Rows;
+use crate::step::Sample;
+use std::sync::Arc;
+
+/// What a step cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Outer iterations (linearisations solved).
+    pub majors: u32,
+    /// Inner iterations (working-set changes of a QP, iterations of a linear solver).
+    pub minors: u32,
+    /// Passes over the kinematic tree.
+    pub passes: u32,
+}
+
+/// Budget and counter of one step: a method can only start a major that is counted and allowed.
+#[derive(Clone, Debug, Default)]
+pub struct Meter {
+    counts: Counts,
+    budget: u32,
+}
+
+impl Meter {
+    /// Starts a major; false if the budget is spent, and then nothing is counted.
+    pub fn next_major(&mut self) -> bool {
+        let allowed = self.counts.majors < self.budget;
+        self.counts.majors += u32::from(allowed);
+        allowed
+    }
+
+    /// Counts `n` minors.
+    pub fn minors(&mut self, n: u32) {
+        self.counts.minors += n;
+    }
+
+    /// Majors that may still be started.
+    pub fn majors_left(&self) -> u32 {
+        self.budget - self.counts.majors
+    }
+
+    /// Counts so far.
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    pub(crate) fn arm(&mut self, budget: u32) {
+        *self = Self { counts: Counts::default(), budget };
+    }
+}
+
+/// Evaluates kinematics and task rows of one problem.
+#[derive(Clone, Debug)]
+pub struct Evaluator {
+    problem: Arc<Problem>,
+    /// Budget and counts of the current step.
+    pub meter: Meter,
+}
+
+/// A configuration's page with its hard and soft rows: scratch owned by a stepper, as many as it needs points.
+#[derive(Clone, Debug)]
+pub struct Linearisation {
+    /// One tree pass.
+    pub page: Page,
+    /// Rows that must hold.
+    pub hard: Rows,
+    /// Rows that may be compromised, multiplied by √Q.
+    pub soft: Rows,
+    second: SecondOrder,
+    phase: PhaseId,
+}
+
+impl Linearisation {
+    /// Room for the largest phase of `problem`.
+    pub fn new(problem: &Problem) -> Self {
+        let robot: &Robot = problem.robot();
+        Self {
+            page: Page::new(robot),
+            hard: Rows::new(problem.largest_hard_rows(), robot.nv()),
+            soft: Rows::new(problem.largest_soft_rows(), robot.nv()),
+            second: SecondOrder::new(robot),
+            phase: PhaseId(0),
+        }
+    }
+}
+
+impl Evaluator {
+    /// An evaluator for `problem`.
+    pub fn new(problem: &Arc<Problem>) -> Self {
+        Self { problem: Arc::clone(problem), meter: Meter::default() }
+    }
+
+    /// One tree pass at `q` (length nq).
+    pub fn pass(&mut self, q: &[f64], page: &mut Page) {
+        self.meter.counts.passes += 1;
+        forward(self.problem.robot(), q, page);
+    }
+
+    /// One tree pass at `q` and the rows of `phase` against `target`.
+    pub fn linearise(&mut self, q: &[f64], phase: PhaseId, target: Sample<'_>, out: &mut Linearisation) {
+        self.pass(q, &mut out.page);
+        let layout = self.problem.layout(phase);
+        let robot = self.problem.robot();
+        layout.hard.fill(robot, q, &out.page, target, &mut out.hard);
+        layout.soft.fill(robot, q, &out.page, target, &mut out.soft);
+        out.phase = phase;
+    }
+
+    /// Fills `second` of both row stacks with `∂[J(q) (q ⊖ q⁻)]/∂v` at the linearised configuration, `dq = q ⊖ q⁻`: the
+    /// exact derivative of the velocity rows of Faraji & Ijspeert (2017), eqs. (8) and (9). For orientation rows as
+    /// logarithms the target rate's own (first-order in the error) dependence on q is left out.
+    pub fn velocity_derivative(&self, lin: &mut Linearisation, target: Sample<'_>, dq: &[f64]) {
+        self.second(lin, target, dq);
+        lin.hard.add_difference_derivative(self.problem.robot(), dq);
+        lin.soft.add_difference_derivative(self.problem.robot(), dq);
+    }
+
+    /// Fills `second` of both row stacks with the product of each row's Hessian (second derivative of
+    /// `error(q ⊕ d)` at d = 0, symmetric) with `u`: entry (i, v) is `Σ_w ∂²error_i/∂v∂w u_w`.
+    pub fn hessian_product(&self, lin: &mut Linearisation, target: Sample<'_>, u: &[f64]) {
+        self.second(lin, target, u);
+        lin.hard.symmetrise_root(self.problem.robot(), u);
+        lin.soft.symmetrise_root(self.problem.robot(), u);
+    }
+
+    fn second(&self, lin: &mut Linearisation, target: Sample<'_>, u: &[f64]) {
+        let layout = self.problem.layout(lin.phase);
+        let robot = self.problem.robot();
+        layout.hard.fill_second(robot, &lin.page, &mut lin.second, target.x, u, &mut lin.hard);
+        layout.soft.fill_second(robot, &lin.page, &mut lin.second, target.x, u, &mut lin.soft);
+    }
+
+    /// Adds the gain-weighted gradients of the problem's objectives to `gradient` (length nv); returns the weighted sum
+    /// of their values.
+    pub fn add_objectives(&self, q: &[f64], gains: &[f64], gradient: &mut [f64]) -> f64 {
+        let robot = self.problem.robot();
+        let objectives = self.problem.objectives().iter().zip(gains);
+        objectives.map(|(o, &gain)| gain * o.add_gradient(robot, q, gain, gradient)).sum()
+    }
+
+    /// Lends at most `majors` of the budget to `inner`: a wrapper cannot spend more on an inner method than it decided.
+    pub fn lend<T>(&mut self, majors: u32, inner: impl FnOnce(&mut Self) -> T) -> T {
+        let budget = self.meter.budget;
+        self.meter.budget = budget.min(self.meter.counts.majors.saturating_add(majors));
+        let result = inner(self);
+        self.meter.budget = budget;
+        result
+    }
+}
