@@ -311,7 +311,8 @@ fn embedded_coman_legs_agree_with_the_reduced_model_of_another_program() {
     }
 }
 
-/// The crouched pose published with the model: feet flat on the ground, centre of mass 0.02 m ahead of the ankles.
+/// The crouched pose published with the model: feet flat on the ground, centre of mass 0.02 m ahead of the
+/// ankles.
 #[test]
 fn coman_legs_stand_in_the_nominal_pose() {
     for id in ["coman-legs", "coman-legs-hyperextension"] {

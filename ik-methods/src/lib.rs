@@ -1,1 +1,19 @@
+//! Ways to solve an inverse-kinematics step.
+//!
+//! One file per formulation, named by what it does; [`registry`] lists them. [`qp`] holds the quadratic programs they
+//! share. This crate knows no suite, no file, no clock.
 
+pub mod baselines;
+pub mod constrained_qp;
+pub mod direct_position;
+pub mod error_integration;
+pub mod gauss_newton;
+mod projected_cg;
+pub mod qp;
+pub mod registry;
+mod sqp;
+pub mod start;
+mod step_qp;
+#[cfg(test)]
+mod testing;
+pub mod two_slack;

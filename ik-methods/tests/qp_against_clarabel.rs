@@ -158,7 +158,7 @@ fn semidefinite() {
 fn semidefinite_with_flat_optimum() {
     sweep("flat optimum", 500, 10, |draw| {
         let (n, m) = size(draw);
-        let rows = draw.index(n);
+        let rows = 1 + draw.index(n);
         let (mut problem, _) = Problem::random(draw, n, m, rows, 0.0);
         // g in the range of H: the objective is flat in the null space of J.
         let target = draw.vector(n, 1.0);

@@ -1,103 +1,22 @@
 //! Making a robot from links and joints, in code or on behalf of a file reader.
 //!
-//! `build` checks names, numbers, limits, the tree and the mimic relations in that order and reports the first fault with
-//! its place. Links are then numbered depth first, children in the order their joints were given; fixed joints are merged.
+//! `build` checks names, numbers, limits, the tree and the mimic relations in that order and reports the
+//! first fault with its place. Links are then numbered depth first, children in the order their joints were
+//! given; fixed joints are merged.
 
 use super::check;
 use super::error::{Place, RobotError};
 use super::mimic::{self, Followed};
 use super::model::{Body, Coordinate, Frame, Joint, Limits, Motion, Robot, Root};
 use super::order::{self, Edge, Visit};
+use super::spec::{Inertial, JointKind, JointSpec, LinkSpec};
 use super::tree::Tree;
 use nalgebra::{Isometry3, Matrix3, Unit, Vector3};
 use std::collections::HashMap;
 
-/// The list of joints on the path to each body grows with the square of the depth; a chain of this many joints needs 4 MiB.
+/// The list of joints on the path to each body grows with the square of the depth; a chain of this many
+/// joints needs 4 MiB.
 const MAX_JOINTS: usize = 1024;
-
-/// What a joint of a description allows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum JointKind {
-    /// Rotation about the axis within limits.
-    Revolute,
-    /// Rotation about the axis without position limits.
-    Continuous,
-    /// Translation along the axis within limits.
-    Prismatic,
-    /// No motion.
-    Fixed,
-    /// All motions, allowed for the only joint of a massless root link: makes the child the root body of a free flyer.
-    Floating,
-}
-
-impl JointKind {
-    pub(super) fn word(self) -> &'static str {
-        match self {
-            Self::Revolute => "revolute",
-            Self::Continuous => "continuous",
-            Self::Prismatic => "prismatic",
-            Self::Fixed => "fixed",
-            Self::Floating => "floating",
-        }
-    }
-
-    pub(super) fn moves(self) -> bool {
-        matches!(self, Self::Revolute | Self::Continuous | Self::Prismatic)
-    }
-}
-
-/// Mass, centre of mass and inertia of a link.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Inertial {
-    /// Mass, kg.
-    pub mass_kg: f64,
-    /// Centre of mass in the link frame, m.
-    pub com: Vector3<f64>,
-    /// Inertia about the centre of mass in the axes of the link frame, kg m^2; symmetric.
-    pub inertia: Matrix3<f64>,
-}
-
-/// A link to be built; without inertial it is massless.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LinkSpec {
-    /// Name, unique among the links.
-    pub name: String,
-    /// Mass data.
-    pub inertial: Option<Inertial>,
-}
-
-/// A joint that follows another: value = `multiplier * value of joint + offset`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Mimic {
-    /// Name of the joint followed, which may itself follow another.
-    pub joint: String,
-    /// Factor.
-    pub multiplier: f64,
-    /// Summand, rad or m.
-    pub offset: f64,
-}
-
-/// A joint to be built.
-#[derive(Debug, Clone, PartialEq)]
-pub struct JointSpec {
-    /// Name, unique among the joints.
-    pub name: String,
-    /// What it allows.
-    pub kind: JointKind,
-    /// Name of the link that carries it.
-    pub parent: String,
-    /// Name of the link it moves.
-    pub child: String,
-    /// Pose of the joint frame in the parent link frame.
-    pub origin: Isometry3<f64>,
-    /// Unit axis in the joint frame; ignored for fixed and floating joints.
-    pub axis: Vector3<f64>,
-    /// Required for revolute and prismatic joints; position limits are ignored for continuous ones. Infinite where there
-    /// is no limit.
-    pub limits: Option<Limits>,
-    /// The joint it follows, if any; limits of a joint that follows another are checked but not used.
-    pub mimic: Option<Mimic>,
-}
 
 /// Collects links and joints, in any order.
 ///
@@ -273,16 +192,17 @@ impl RobotBuilder {
 
     /// The kind of root and the links that are left when a floating joint has been taken off the tree.
     fn take_floating_joint(&self, mut visits: Vec<Visit>) -> Result<(Root, Vec<Visit>), RobotError> {
-        let is_floating = |visit: &Visit| {
-            visit
-                .via
-                .is_some_and(|j| self.joints[j].0.kind == JointKind::Floating)
-        };
-        let Some(at) = visits.iter().rposition(is_floating) else {
+        let is_floating = |j: &usize| self.joints[*j].0.kind == JointKind::Floating;
+        // The last one: a second floating joint further down must not pass unseen.
+        let floating = visits
+            .iter()
+            .rev()
+            .find_map(|visit| visit.via.filter(is_floating).map(|j| (visit.parent, j)));
+        let Some((parent, j)) = floating else {
             return Ok((self.root, visits));
         };
-        if let Some(rule) = self.floating_rule_broken(&visits, at) {
-            let (joint, place) = &self.joints[visits[at].via.unwrap_or_default()];
+        let (joint, place) = &self.joints[j];
+        if let Some(rule) = self.floating_rule_broken(&visits, parent, joint) {
             return Err(RobotError::FloatingJoint {
                 place: place.clone(),
                 joint: joint.name.clone(),
@@ -297,10 +217,14 @@ impl RobotBuilder {
         Ok((Root::Floating, visits))
     }
 
-    fn floating_rule_broken(&self, visits: &[Visit], at: usize) -> Option<&'static str> {
+    fn floating_rule_broken(
+        &self,
+        visits: &[Visit],
+        parent: usize,
+        joint: &JointSpec,
+    ) -> Option<&'static str> {
         let (root, _) = &self.links[visits[0].link];
-        let origin = visits[at].via.map(|j| self.joints[j].0.origin);
-        if visits[at].parent != 0 {
+        if parent != 0 {
             Some("must hang on the root link")
         } else if visits.iter().skip(1).filter(|visit| visit.parent == 0).count() > 1 {
             Some("must be the only joint of the root link")
@@ -310,7 +234,7 @@ impl RobotBuilder {
             .is_some_and(|inertial| inertial.mass_kg > 0.0)
         {
             Some("needs a massless root link, which it replaces")
-        } else if origin.is_some_and(|origin| origin != Isometry3::identity()) {
+        } else if joint.origin != Isometry3::identity() {
             Some("must have no origin: the configuration itself is the pose of its child in the world")
         } else {
             None

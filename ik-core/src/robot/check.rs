@@ -1,11 +1,12 @@
 //! Checks of single links and joints: numbers, masses, axes, limits.
 
-use super::builder::{Inertial, JointKind, JointSpec, LinkSpec};
 use super::error::{Place, RobotError};
 use super::model::Limits;
+use super::spec::{Inertial, JointKind, JointSpec, LinkSpec};
 use nalgebra::Isometry3;
 
-/// An axis this near to unit length is normalised, one further away is refused: files write six decimals or more.
+/// An axis this near to unit length is normalised, one further away is refused: files write six decimals or
+/// more.
 const AXIS_TOLERANCE: f64 = 1e-6;
 
 /// Refuses a link whose mass is negative or whose numbers are not finite.
@@ -32,7 +33,8 @@ pub(super) fn link(link: &LinkSpec, place: &Place) -> Result<(), RobotError> {
     Ok(())
 }
 
-/// Refuses a joint whose numbers are not finite, whose axis is no unit vector or whose limits are missing or no limits.
+/// Refuses a joint whose numbers are not finite, whose axis is no unit vector or whose limits are missing or
+/// no limits.
 pub(super) fn joint(joint: &JointSpec, place: &Place) -> Result<(), RobotError> {
     let owner = format!("joint `{}`", joint.name);
     finite(place, &owner, "origin", not_finite_in(&joint.origin))?;

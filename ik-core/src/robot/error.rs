@@ -1,12 +1,13 @@
 //! What can be wrong with a robot description, each case with the values found and where they stand.
 
 use std::fmt;
+use std::sync::Arc;
 
 /// Where in a description an offending element stands.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
     /// File name of a parsed description, name of the robot of one made in code.
-    pub source: String,
+    pub source: Arc<str>,
     /// Line in the file, counted from one; `None` for a robot made in code or an error of the whole file.
     pub line: Option<u32>,
 }
@@ -15,7 +16,7 @@ impl Place {
     /// A place without line: a whole file or a robot made in code.
     pub fn of(source: &str) -> Self {
         Self {
-            source: source.to_owned(),
+            source: source.into(),
             line: None,
         }
     }
@@ -23,7 +24,7 @@ impl Place {
     /// Line `line` (from one) of the file `source`.
     pub fn line(source: &str, line: u32) -> Self {
         Self {
-            source: source.to_owned(),
+            source: source.into(),
             line: Some(line),
         }
     }

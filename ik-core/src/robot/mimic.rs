@@ -1,7 +1,7 @@
 //! Mimic relations: each joint's value as an affine function of one independent joint.
 
-use super::builder::{JointSpec, Mimic};
 use super::error::{Place, RobotError};
+use super::spec::{JointSpec, Mimic};
 use std::collections::HashMap;
 
 /// Value = `multiplier * value of the independent joint + offset`.

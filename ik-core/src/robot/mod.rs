@@ -15,11 +15,13 @@ mod error;
 mod mimic;
 mod model;
 mod order;
+mod spec;
 mod tree;
 mod urdf;
 
-pub use builder::{Inertial, JointKind, JointSpec, LinkSpec, Mimic, RobotBuilder};
+pub use builder::RobotBuilder;
 pub use embedded::{EMBEDDED, EmbeddedRobot, embedded};
 pub use error::{Place, RobotError};
 pub use model::{Body, Coordinate, Frame, FrameId, Joint, Limits, Motion, Robot, Root};
+pub use spec::{Inertial, JointKind, JointSpec, LinkSpec, Mimic};
 pub use urdf::UrdfOptions;

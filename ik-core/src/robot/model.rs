@@ -1,12 +1,12 @@
 //! The robot: an immutable tree of rigid bodies joined by revolute and prismatic joints.
 //!
-//! Bodies and joints are numbered depth first, parents before children; joint `i` moves body `i + 1` and body 0 is the
-//! root. A body's frame coincides with its joint's frame at joint value zero, so that with `x_w_p` the pose of the parent
-//! in the world the child stands at `x_w_p * x_parent_joint * motion(axis, value)`.
+//! Bodies and joints are numbered depth first, parents before children; joint `i` moves body `i + 1` and body
+//! 0 is the root. A body's frame coincides with its joint's frame at joint value zero, so that with `x_w_p`
+//! the pose of the parent in the world the child stands at `x_w_p * x_parent_joint * motion(axis, value)`.
 //!
-//! Configuration `q = [root | coordinates]`, velocity `v = [root | coordinates]`. A floating root contributes its pose in
-//! the world, `[x y z qx qy qz qw]`, to `q` and six numbers to `v`; a fixed root contributes nothing. Every joint follows
-//! one independent coordinate affinely (mimic joints share one).
+//! Configuration `q = [root | coordinates]`, velocity `v = [root | coordinates]`. A floating root contributes
+//! its pose in the world, `[x y z qx qy qz qw]`, to `q` and six numbers to `v`; a fixed root contributes
+//! nothing. Every joint follows one independent coordinate affinely (mimic joints share one).
 
 use super::aligned::{AlignedJoint, AlignedTree, align};
 use super::check;
@@ -26,8 +26,8 @@ pub enum Root {
     /// The root body frame is the world frame.
     #[default]
     Fixed,
-    /// Free flyer: `q` starts with the pose of the root body in the world, position in m, then the unit quaternion in the
-    /// order x, y, z, w; `v` starts with six numbers.
+    /// Free flyer: `q` starts with the pose of the root body in the world, position in m, then the unit
+    /// quaternion in the order x, y, z, w; `v` starts with six numbers.
     Floating,
 }
 
@@ -49,7 +49,8 @@ impl Root {
     }
 }
 
-/// The one-parameter motion a joint allows. A continuous joint is a revolute one with infinite position limits.
+/// The one-parameter motion a joint allows. A continuous joint is a revolute one with infinite position
+/// limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Motion {
@@ -250,7 +251,8 @@ impl Robot {
         &self.coordinates
     }
 
-    /// Every link of the description, in tree order; links behind fixed joints are frames of the body they belong to.
+    /// Every link of the description, in tree order; links behind fixed joints are frames of the body they
+    /// belong to.
     pub fn frames(&self) -> &[Frame] {
         &self.frames
     }
@@ -324,8 +326,8 @@ impl Robot {
 
     /// The same robot with some coordinates held at a value (rad or m), which need not lie within the limits.
     ///
-    /// The bodies they move are lumped into the body that carries them, frames move along, joints that mimic a locked one
-    /// are locked too. Coordinates are renumbered.
+    /// The bodies they move are lumped into the body that carries them, frames move along, joints that mimic
+    /// a locked one are locked too. Coordinates are renumbered.
     ///
     /// # Errors
     /// A name that is no independent coordinate, a joint named twice, a value that is not finite.
@@ -401,4 +403,22 @@ fn subtree_ends(joints: &[Joint]) -> Vec<usize> {
         end[joint.parent] = end[joint.parent].max(end[i + 1]);
     }
     end
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::robot::embedded;
+
+    #[test]
+    fn a_subtree_is_the_bodies_whose_path_goes_through_its_root() {
+        for id in ["coman", "coman-legs", "arm7"] {
+            let robot = embedded(id).expect("embedded robots are sound");
+            let bodies = robot.bodies().len();
+            assert_eq!(robot.subtree_end[0], bodies);
+            for top in 1..bodies {
+                let inside = (0..bodies).filter(|&body| robot.path(body).contains(&(top - 1)));
+                assert!(inside.eq(top..robot.subtree_end[top]), "{id} body {top}");
+            }
+        }
+    }
 }

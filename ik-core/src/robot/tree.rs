@@ -1,7 +1,8 @@
 //! The bare tree a robot is made of, and the one operation on it: making joints rigid.
 //!
-//! A fixed joint of a description and a joint locked at a value are the same thing, a joint whose child is merged into its
-//! parent: masses add, centres of mass average, inertias add about the common centre of mass by the parallel axis theorem.
+//! A fixed joint of a description and a joint locked at a value are the same thing, a joint whose child is
+//! merged into its parent: masses add, centres of mass average, inertias add about the common centre of mass
+//! by the parallel axis theorem.
 
 use super::check::not_finite_in;
 use super::error::{Place, RobotError};
@@ -45,7 +46,8 @@ impl Tree {
         merged
     }
 
-    /// The tree with every joint that has a value made rigid at that joint value; coordinates are left as they are.
+    /// The tree with every joint that has a value made rigid at that joint value; coordinates are left as
+    /// they are.
     pub(super) fn merge(self, rigid: &[Option<f64>]) -> Self {
         let mut bodies = self.bodies.into_iter();
         let mut merged = Self {

@@ -1,12 +1,13 @@
 //! Reading URDF, the Unified Robot Description Format (`<robot>` with `<link>` and `<joint>` elements).
 //!
-//! Only what kinematics and statics need is read: link/inertial (origin, mass, inertia) and joint/type, parent, child,
-//! origin, axis, limit, mimic. Everything else (visual, collision, transmission, gazebo ..) is ignored. `rpy` is the
-//! rotation `Rz(yaw) Ry(pitch) Rx(roll)`. No mesh, no other file is opened.
+//! Only what kinematics and statics need is read: link/inertial (origin, mass, inertia) and joint/type,
+//! parent, child, origin, axis, limit, mimic. Everything else (visual, collision, transmission, gazebo ..) is
+//! ignored. `rpy` is the rotation `Rz(yaw) Ry(pitch) Rx(roll)`. No mesh, no other file is opened.
 
-use super::builder::{Inertial, JointKind, JointSpec, LinkSpec, Mimic, RobotBuilder};
+use super::builder::RobotBuilder;
 use super::error::{Place, RobotError};
 use super::model::{Limits, Robot, Root};
+use super::spec::{Inertial, JointKind, JointSpec, LinkSpec, Mimic};
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 use std::path::Path;
@@ -14,7 +15,8 @@ use std::path::Path;
 /// What a URDF file does not say.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct UrdfOptions {
-    /// How the root link is attached to the world. A joint of type `floating` under the root link makes it floating too.
+    /// How the root link is attached to the world. A joint of type `floating` under the root link makes it
+    /// floating too.
     pub root: Root,
 }
 

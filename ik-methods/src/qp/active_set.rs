@@ -124,7 +124,7 @@ impl ActiveSet {
             if error <= CONVERGED && !doubtful {
                 return QpStatus::Solved;
             }
-            if !(error < f64::INFINITY) {
+            if !error.is_finite() {
                 return QpStatus::Numerical;
             }
             let stalled = error > 0.5 * best && error <= ACCEPTED;
@@ -157,7 +157,8 @@ impl ActiveSet {
         for (out, &unknown) in self.at_positions.iter_mut().zip(&self.reduced.order) {
             *out = gradient[unknown];
         }
-        let scale = max_abs(qp.g) + max_abs(gradient);
+        // The last term counts where the objective is zero: its multipliers are those of the proximal term.
+        let scale = max_abs(qp.g) + max_abs(gradient) + self.reduced.proximal_weight() * max_abs(&self.dual.x);
         let residual = &mut self.residual[..self.reduced.unknowns()];
         self.reduced.project(&self.at_positions[..n], residual);
         self.dual.remove_multipliers(&self.reduced, residual);

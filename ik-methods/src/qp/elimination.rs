@@ -16,7 +16,7 @@
 //! above the diagonal (U) then the part below (L and what is not yet eliminated). The update of a column may
 //! then start at a whole block: it spoils only entries of the lower run that are never read again.
 
-use super::kernels::{LANES, add_scaled_blocks, padded};
+use super::kernels::{GROUP, LANES, copy_padded, dot, group_of, padded, subtract_scaled_group};
 use super::{MatRef, Qp};
 
 /// A row is put off when its largest remaining entry falls below this fraction of its original 1-norm.
@@ -66,18 +66,20 @@ pub(super) struct Elimination {
     ld: usize,
     /// n + 1 columns of `2 * ld` entries: upper run, lower run.
     store: Vec<f64>,
-    /// Lower run of the current pivot column.
-    pivot: Vec<f64>,
     /// Original index of each row in its current place.
     rows: Vec<usize>,
     /// 1-norm of each row of A, moving with the row.
     row_scale: Vec<f64>,
-    /// Pivot preference per column.
+    /// Pivot preference per column; 0 for the right-hand side.
     weight: Vec<f64>,
     /// Column eliminated by each row in turn: B.
     pub(super) pivots: Vec<usize>,
-    /// Columns not eliminated: N.
-    pub(super) remaining: Vec<usize>,
+    /// Columns still to be updated: the right-hand side and then, in any order, those not eliminated (N).
+    live: Vec<usize>,
+    /// Entry of the next pivot row in each live column.
+    next_row: Vec<f64>,
+    /// Multiple of the pivot column to subtract from each live column.
+    factors: Vec<f64>,
 }
 
 impl Elimination {
@@ -88,18 +90,24 @@ impl Elimination {
             n: 0,
             ld: 0,
             store: vec![0.0; 2 * ld * (n + 1)],
-            pivot: vec![0.0; ld],
             rows: Vec::with_capacity(m),
             row_scale: vec![0.0; ld],
-            weight: vec![0.0; n],
+            weight: vec![0.0; n + 1],
             pivots: Vec::with_capacity(m.min(n)),
-            remaining: Vec::with_capacity(n),
+            live: Vec::with_capacity(n + 1),
+            next_row: vec![0.0; n + 1],
+            factors: vec![0.0; n + 1],
         }
     }
 
     /// Number of rows eliminated.
     pub(super) fn rank(&self) -> usize {
         self.pivots.len()
+    }
+
+    /// Columns not eliminated: N.
+    pub(super) fn remaining(&self) -> &[usize] {
+        &self.live[1..]
     }
 
     /// Eliminates the rows of `qp`.
@@ -115,33 +123,37 @@ impl Elimination {
     fn load(&mut self, qp: &Qp<'_>) {
         (self.m, self.n, self.ld) = (qp.equalities(), qp.unknowns(), padded(qp.equalities()));
         self.pivots.clear();
-        self.remaining.clear();
-        self.remaining.extend(0..self.n);
+        self.live.clear();
+        self.live.push(self.n);
+        self.live.extend(0..self.n);
         self.rows.clear();
         self.rows.extend(0..self.m);
         for ((weight, lo), hi) in self.weight.iter_mut().zip(qp.lo).zip(qp.hi) {
             let is_free = *lo == f64::NEG_INFINITY && *hi == f64::INFINITY;
             *weight = if is_free { 1.0 } else { BOUNDED_WEIGHT };
         }
+        self.weight[self.n] = 0.0;
         if self.m > 0 {
             self.load_rows(&qp.a, qp.b);
         }
     }
 
     fn load_rows(&mut self, a: &MatRef<'_>, b: &[f64]) {
-        let (m, ld) = (self.m, self.ld);
-        self.row_scale[..ld].fill(0.0);
+        let ld = self.ld;
         for (j, column) in self.store.chunks_exact_mut(2 * ld).take(self.n).enumerate() {
-            let lower = &mut column[ld..];
-            lower[..m].copy_from_slice(a.col(j));
-            lower[m..].fill(0.0);
-            for (scale, value) in self.row_scale.iter_mut().zip(lower) {
-                *scale += value.abs();
-            }
+            copy_padded(a.col(j), &mut column[ld..]);
         }
-        let rhs = &mut self.store[(2 * self.n + 1) * ld..][..ld];
-        rhs[..m].copy_from_slice(b);
-        rhs[m..].fill(0.0);
+        copy_padded(b, &mut self.store[(2 * self.n + 1) * ld..][..ld]);
+        for (block, scale) in self.row_scale[..ld].as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+            let mut sums = [0.0; LANES];
+            for column in self.store.chunks_exact(2 * ld).take(self.n) {
+                let [entries] = group_of::<1>(&column[ld + block * LANES..]);
+                for lane in 0..LANES {
+                    sums[lane] += entries[lane].abs();
+                }
+            }
+            *scale = sums;
+        }
     }
 
     fn factorise(&mut self) {
@@ -160,26 +172,34 @@ impl Elimination {
         }
         while let Some((pivot_row, slot)) = self.best_of_rows_from(row) {
             self.swap_rows(row, pivot_row);
+            self.best_in_row(row);
             self.eliminate(row, slot);
             row += 1;
         }
     }
 
-    /// Entry of `row` in the remaining column number `slot`.
+    /// Entry of `row` in the live column number `slot`.
     fn entry(&self, row: usize, slot: usize) -> f64 {
-        self.store[(2 * self.remaining[slot] + 1) * self.ld + row]
+        self.store[(2 * self.live[slot] + 1) * self.ld + row]
     }
 
+    /// True if `slot` is an unknown with an entry above `fraction` of the row; slot 0 is the right-hand side.
     fn is_above(&self, fraction: f64, row: usize, slot: usize) -> bool {
-        slot < self.remaining.len() && self.entry(row, slot).abs() > fraction * self.row_scale[row]
+        slot > 0 && self.entry(row, slot).abs() > fraction * self.row_scale[row]
     }
 
-    /// Key of the best pivot of `row`: weighted magnitude with its last bits replaced by the slot.
-    fn best_in_row(&self, row: usize) -> u64 {
-        let keys = self.remaining.iter().enumerate().map(|(slot, &column)| {
-            pivot_key(self.store[(2 * column + 1) * self.ld + row] * self.weight[column], slot)
-        });
-        if row < self.m { keys.max().unwrap_or(0) } else { 0 }
+    /// Reads `row` into `next_row`; returns the key of its best pivot: weighted magnitude with its last bits
+    /// replaced by the slot.
+    fn best_in_row(&mut self, row: usize) -> u64 {
+        let mut key = 0;
+        if row < self.m {
+            for (slot, &column) in self.live.iter().enumerate() {
+                let value = self.store[(2 * column + 1) * self.ld + row];
+                self.next_row[slot] = value;
+                key = key.max(pivot_key(value * self.weight[column], slot));
+            }
+        }
+        key
     }
 
     /// Independent row and slot with the largest remaining entry relative to its row, from `first` on.
@@ -187,7 +207,7 @@ impl Elimination {
         let mut best = None;
         let mut largest = 0.0;
         for row in first..self.m {
-            for slot in 0..self.remaining.len() {
+            for slot in 1..self.live.len() {
                 let relative = self.entry(row, slot).abs() / self.row_scale[row];
                 if relative > largest && self.is_above(DEPENDENT, row, slot) {
                     largest = relative;
@@ -209,27 +229,58 @@ impl Elimination {
         }
     }
 
-    /// Eliminates `row` with the remaining column `slot` as pivot; returns the pivot key of the next row.
+    /// Eliminates `row`, whose entries are in `next_row`, with the live column `slot` as pivot; returns the
+    /// pivot key of the row after it.
+    ///
+    /// Optimisation: the entries of the row after it are computed first and on their own, so that the search
+    /// for its pivot and the division need not wait for the update of the whole matrix.
     fn eliminate(&mut self, row: usize, slot: usize) -> u64 {
         let (ld, stride) = (self.ld, 2 * self.ld);
-        let column = self.remaining.swap_remove(slot);
+        let inverse = 1.0 / self.next_row[slot];
+        let last = self.live.len() - 1;
+        self.next_row.swap(slot, last);
+        let column = self.live.swap_remove(slot);
         self.pivots.push(column);
-        let first = (row + 1) / LANES * LANES;
+        self.store[column * stride..][row..padded(row)].fill(0.0);
+
         let next = (row + 1).min(self.m - 1);
+        let pivot_next = self.store[column * stride + ld + next];
+        let key = {
+            let (store, weight) = (self.store.as_mut_slice(), self.weight.as_slice());
+            let mut key = 0;
+            let slots = self.live.iter().zip(&mut self.next_row).zip(&mut self.factors);
+            for (slot, ((&column, entry), out)) in slots.enumerate() {
+                let entries = &mut store[column * stride..][..stride];
+                let factor = *entry * inverse;
+                *out = factor;
+                entries[row] = factor;
+                let value = entries[ld + next] - factor * pivot_next;
+                *entry = value;
+                key = key.max(pivot_key(value * weight[column], slot));
+            }
+            key
+        };
 
-        let (upper, lower) = self.store[column * stride..][..stride].split_at_mut(ld);
-        upper[row..padded(row)].fill(0.0);
-        let pivot = &mut self.pivot[..ld - first];
-        pivot.copy_from_slice(&lower[first..]);
-        let inverse = 1.0 / lower[row];
-
-        let mut key = 0;
-        for (slot, &column) in self.remaining.iter().enumerate() {
-            let value = eliminate_from(&mut self.store[column * stride..][..stride], row, inverse, pivot)[next];
-            key = key.max(pivot_key(value * self.weight[column], slot));
+        let first = (row + 1) / LANES * LANES;
+        for start in (first..ld).step_by(GROUP * LANES) {
+            match (ld - start) / LANES {
+                1 => self.subtract_pivot::<1>(column, start),
+                2 => self.subtract_pivot::<2>(column, start),
+                3 => self.subtract_pivot::<3>(column, start),
+                _ => self.subtract_pivot::<GROUP>(column, start),
+            }
         }
-        eliminate_from(&mut self.store[self.n * stride..][..stride], row, inverse, pivot);
         key
+    }
+
+    /// Subtracts multiples of column `pivot` from all live columns in `BLOCKS` blocks of rows from `start`.
+    fn subtract_pivot<const BLOCKS: usize>(&mut self, pivot: usize, start: usize) {
+        let offset = self.ld + start;
+        let stride = 2 * self.ld;
+        let pivot = group_of::<BLOCKS>(&self.store[pivot * stride + offset..]);
+        for (&column, factor) in self.live.iter().zip(&self.factors) {
+            subtract_scaled_group(&mut self.store[column * stride + offset..], *factor, &pivot);
+        }
     }
 
     /// True if every row found dependent has a right-hand side to match.
@@ -255,14 +306,14 @@ impl Elimination {
     ///
     /// `stride` is a whole number of blocks and at least the rank.
     pub(super) fn solution_into(&self, stride: usize, t_and_c: &mut [f64]) {
-        let (k, rank) = (self.remaining.len(), self.rank());
+        let (k, rank) = (self.remaining().len(), self.rank());
         let columns = &mut t_and_c[..stride * (k + 1)];
         if rank == 0 {
             columns.fill(0.0);
             return;
         }
         for (slot, out) in columns.chunks_exact_mut(stride).enumerate() {
-            let (source, sign) = if slot < k { (self.remaining[slot], -1.0) } else { (self.n, 1.0) };
+            let (source, sign) = if slot < k { (self.remaining()[slot], -1.0) } else { (self.n, 1.0) };
             let upper = &self.column(source).0[..rank];
             for (out, value) in out.iter_mut().zip(upper) {
                 *out = sign * value;
@@ -271,9 +322,13 @@ impl Elimination {
         }
         for s in (1..rank).rev() {
             let upper = &self.column(self.pivots[s]).0[..padded(s)];
-            for column in columns.chunks_exact_mut(stride) {
-                let value = column[s];
-                add_scaled_blocks(column, -value, upper);
+            for start in (0..upper.len()).step_by(GROUP * LANES) {
+                match (upper.len() - start) / LANES {
+                    1 => substitute::<1>(columns, stride, s, start, upper),
+                    2 => substitute::<2>(columns, stride, s, start, upper),
+                    3 => substitute::<3>(columns, stride, s, start, upper),
+                    _ => substitute::<GROUP>(columns, stride, s, start, upper),
+                }
             }
         }
     }
@@ -286,11 +341,11 @@ impl Elimination {
         let rank = self.rank();
         for s in 1..rank {
             let upper = &self.column(self.pivots[s]).0[..s];
-            q[s] -= super::kernels::dot(upper, &q[..s]);
+            q[s] -= dot(upper, &q[..s]);
         }
         for s in (0..rank).rev() {
             let lower = self.column(self.pivots[s]).1;
-            q[s] = (q[s] - super::kernels::dot(&lower[s + 1..rank], &q[s + 1..rank])) / lower[s];
+            q[s] = (q[s] - dot(&lower[s + 1..rank], &q[s + 1..rank])) / lower[s];
             y[self.rows[s]] = q[s];
         }
     }
@@ -302,13 +357,11 @@ fn pivot_key(value: f64, slot: usize) -> u64 {
     (value.abs().to_bits() & !INDEX_MASK) | slot as u64
 }
 
-/// Subtracts its multiple of the pivot column from one column and returns the lower run.
-#[inline]
-fn eliminate_from<'a>(column: &'a mut [f64], row: usize, inverse: f64, pivot: &[f64]) -> &'a [f64] {
-    let (upper, lower) = column.split_at_mut(column.len() / 2);
-    let factor = lower[row] * inverse;
-    upper[row] = factor;
-    let first = lower.len() - pivot.len();
-    add_scaled_blocks(&mut lower[first..], -factor, pivot);
-    lower
+/// Substitutes unknown `s`, final in each of `columns`, into `BLOCKS` blocks of rows above it.
+fn substitute<const BLOCKS: usize>(columns: &mut [f64], stride: usize, s: usize, start: usize, upper: &[f64]) {
+    let upper = group_of::<BLOCKS>(&upper[start..]);
+    for column in columns.chunks_exact_mut(stride) {
+        let value = column[s];
+        subtract_scaled_group(&mut column[start..], value, &upper);
+    }
 }

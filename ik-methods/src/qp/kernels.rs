@@ -12,13 +12,36 @@ pub(super) fn padded(len: usize) -> usize {
     len.next_multiple_of(LANES)
 }
 
-/// y += a x over whole blocks; entries beyond the last whole block of the shorter slice are left alone.
-#[inline]
-pub(super) fn add_scaled_blocks(y: &mut [f64], a: f64, x: &[f64]) {
-    for (y, x) in y.as_chunks_mut::<LANES>().0.iter_mut().zip(x.as_chunks::<LANES>().0) {
+/// Blocks of one column that are kept in registers while they are subtracted from others.
+pub(super) const GROUP: usize = 4;
+
+/// y -= a x for a fixed number of blocks; fully unrolled.
+#[inline(always)]
+pub(super) fn subtract_scaled_group<const BLOCKS: usize>(y: &mut [f64], a: f64, x: &[[f64; LANES]; BLOCKS]) {
+    for (y, x) in y[..BLOCKS * LANES].as_chunks_mut::<LANES>().0.iter_mut().zip(x) {
         for lane in 0..LANES {
-            y[lane] += a * x[lane];
+            y[lane] -= a * x[lane];
         }
+    }
+}
+
+/// The first `BLOCKS` blocks of x.
+#[inline(always)]
+pub(super) fn group_of<const BLOCKS: usize>(x: &[f64]) -> [[f64; LANES]; BLOCKS] {
+    std::array::from_fn(|block| std::array::from_fn(|lane| x[block * LANES + lane]))
+}
+
+/// Copies `source` and fills the rest of `out` with zeros; `out` is a whole number of blocks.
+#[inline]
+pub(super) fn copy_padded(source: &[f64], out: &mut [f64]) {
+    let (blocks, rest) = source.as_chunks::<LANES>();
+    let (out_blocks, _) = out.as_chunks_mut::<LANES>();
+    for (out, block) in out_blocks.iter_mut().zip(blocks) {
+        *out = *block;
+    }
+    for (index, out) in out_blocks.iter_mut().enumerate().skip(blocks.len()) {
+        let first = (index - blocks.len()) * LANES;
+        *out = std::array::from_fn(|lane| rest.get(first + lane).copied().unwrap_or(0.0));
     }
 }
 

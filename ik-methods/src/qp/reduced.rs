@@ -42,6 +42,8 @@ pub(super) struct Reduced {
     /// L, k x k, column-major, lower triangle.
     factor: Vec<f64>,
     inverse_diagonal: Vec<f64>,
+    /// eps, 0 where M is positive definite.
+    proximal_weight: f64,
     /// Unknown at each position.
     pub(super) order: Vec<usize>,
 }
@@ -59,6 +61,7 @@ impl Reduced {
             gathered: vec![0.0; padded(n) + LANES],
             factor: vec![0.0; n * n],
             inverse_diagonal: vec![0.0; n],
+            proximal_weight: 0.0,
             order: Vec::with_capacity(n),
         }
     }
@@ -66,6 +69,11 @@ impl Reduced {
     /// Number of unknowns left, k = n - rank.
     pub(super) fn unknowns(&self) -> usize {
         self.k
+    }
+
+    /// Weight eps of the proximal term in the factor, 0 if it is exact.
+    pub(super) fn proximal_weight(&self) -> f64 {
+        self.proximal_weight
     }
 
     /// Number of eliminated unknowns.
@@ -76,12 +84,12 @@ impl Reduced {
     /// Takes over T and c.
     pub(super) fn load(&mut self, elimination: &Elimination) {
         self.rank = elimination.rank();
-        self.k = elimination.remaining.len();
+        self.k = elimination.remaining().len();
         self.n = self.rank + self.k;
         self.stride = padded(self.rank).max(LANES);
         self.order.clear();
         self.order.extend_from_slice(&elimination.pivots);
-        self.order.extend_from_slice(&elimination.remaining);
+        self.order.extend_from_slice(elimination.remaining());
         elimination.solution_into(self.stride, &mut self.t_and_c);
     }
 
@@ -89,13 +97,14 @@ impl Reduced {
     pub(super) fn factorise(&mut self, qp: &Qp<'_>) -> bool {
         self.multiply_hessian(&qp.h, qp.g);
         let largest = self.assemble();
+        self.proximal_weight = 0.0;
         if self.cholesky(SAFE_PIVOT * largest) {
             return true;
         }
-        let weight = PROXIMAL_WEIGHT * if largest > 0.0 { largest } else { fallback_scale(qp) };
+        self.proximal_weight = PROXIMAL_WEIGHT * if largest > 0.0 { largest } else { fallback_scale(qp) };
         self.assemble();
         for a in 0..self.k {
-            self.factor[a * (self.k + 1)] += weight;
+            self.factor[a * (self.k + 1)] += self.proximal_weight;
         }
         self.cholesky(0.0)
     }

@@ -1,0 +1,242 @@
+//! Figures of a results folder as SVG: those of Faraji & Ijspeert, "Singularity-tolerant inverse kinematics for bipedal
+//! robots: an efficient use of computational power to reduce energy consumption" (2017), and overviews over all suites.
+//!
+//! Everything is drawn from the rows and traces of the folder and from nothing else: the same folder gives the same
+//! bytes. Where several rows of a suite differ in Δt, the figures show that of the last.
+
+mod axis;
+mod boundary;
+mod family;
+pub(crate) mod labels;
+mod lean;
+mod overview;
+mod panel;
+mod posture;
+mod regulator;
+mod sheet;
+mod style;
+mod tracking;
+
+use crate::records::{Row, Trace};
+use crate::records_io::{ROWS_FILE, RecordError, read_rows, read_trace, write_atomically};
+use labels::{Labelled, labelled};
+use std::path::{Path, PathBuf};
+use style::Styles;
+
+/// Why figures could not be drawn.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FigureError {
+    /// Rows or a trace could not be read, or a figure not written.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// The drawing library refused.
+    #[error("{figure}: drawing failed: {reason}")]
+    Draw {
+        /// File name.
+        figure: String,
+        /// Its message.
+        reason: String,
+    },
+}
+
+/// Limits that figures draw beside the data.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DrawnLimits {
+    /// Lower and upper knee angle (rad).
+    pub knee_rad: (f64, f64),
+    /// Lower and upper hip pitch (rad).
+    pub hip_pitch_rad: (f64, f64),
+    /// Largest joint velocity (rad/s).
+    pub velocity_rad_s: f64,
+    /// Margin q_s of the ellipse (rad).
+    pub margin_rad: f64,
+    /// Slope κ of the polygon (1/s).
+    pub polygon_slope_per_s: f64,
+    /// Velocity v₀ with which the polygon lets a joint leave its limit (rad/s).
+    pub polygon_exit_velocity_rad_s: f64,
+}
+
+impl DrawnLimits {
+    /// Coman with the knee limited at its singularity, Table I of the paper, and our polygon.
+    pub const COMAN: Self = Self {
+        knee_rad: (0.0, 1.9199),
+        hip_pitch_rad: (-1.9199, 0.7854),
+        velocity_rad_s: 4.0,
+        margin_rad: 0.0,
+        polygon_slope_per_s: 8.0,
+        polygon_exit_velocity_rad_s: 0.02,
+    };
+}
+
+/// What [`draw_all`] did.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Drawn {
+    /// Files written.
+    pub files: Vec<PathBuf>,
+    /// Figures left out and curves missing, with the reason.
+    pub notes: Vec<String>,
+}
+
+/// Draws every figure for which the folder has data into its subfolder `figures`. A figure without data is left out with
+/// a note; a file left there by an earlier run is then removed, lest it be taken for one of these rows.
+///
+/// # Errors
+/// [`FigureError`]; figures drawn before the error stay.
+pub fn draw_all(dir: &Path, limits: &DrawnLimits) -> Result<Drawn, FigureError> {
+    let rows = read_rows(&dir.join(ROWS_FILE))?.rows;
+    let runs = of_last_dt(labelled(&rows));
+    let styles = Styles::assign(runs.iter().map(|r| r.label.as_str()));
+    let mut studio = Studio { dir, runs, styles, limits: *limits, notes: Vec::new() };
+    let mut files = Vec::new();
+    for (name, paint) in FIGURES {
+        let path = dir.join("figures").join(name);
+        match paint(&mut studio) {
+            Ok(svg) => {
+                write_atomically(&path, &svg)?;
+                files.push(path);
+            }
+            Err(Obstacle::NoData(reason)) => {
+                studio.notes.push(format!("{name} not drawn: {reason}"));
+                remove_stale(&path)?;
+            }
+            Err(Obstacle::Record(error)) => return Err(error.into()),
+            Err(Obstacle::Draw(reason)) => return Err(FigureError::Draw { figure: name.to_owned(), reason }),
+        }
+    }
+    studio.notes.dedup();
+    Ok(Drawn { files, notes: studio.notes })
+}
+
+fn remove_stale(path: &Path) -> Result<(), RecordError> {
+    match std::fs::remove_file(path) {
+        Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+            Err(RecordError::Io { path: path.to_path_buf(), action: "remove", source })
+        }
+        _ => Ok(()),
+    }
+}
+
+type Paint = fn(&mut Studio<'_>) -> Result<String, Obstacle>;
+
+const FIGURES: [(&str, Paint); 13] = [
+    ("fig1_squat.svg", tracking::squat),
+    ("fig2_stretch.svg", tracking::stretch),
+    ("fig2_stretch_fast.svg", tracking::stretch_fast),
+    ("fig3_asymmetric.svg", tracking::asymmetric),
+    ("fig3_family.svg", family::survival),
+    ("fig4_lean.svg", lean::lean),
+    ("fig5_boundary.svg", boundary::boundary),
+    ("fig6_regulator.svg", regulator::regulator),
+    ("fig7_posture.svg", posture::posture),
+    ("overview_error.svg", overview::error),
+    ("overview_time.svg", overview::time),
+    ("overview_majors.svg", overview::majors),
+    ("overview_hard.svg", overview::hard),
+];
+
+/// Why one figure is not drawn.
+enum Obstacle {
+    NoData(String),
+    Record(RecordError),
+    Draw(String),
+}
+
+impl From<String> for Obstacle {
+    fn from(message: String) -> Self {
+        Self::Draw(message)
+    }
+}
+
+impl From<RecordError> for Obstacle {
+    fn from(error: RecordError) -> Self {
+        Self::Record(error)
+    }
+}
+
+/// What every figure is drawn from.
+struct Studio<'a> {
+    dir: &'a Path,
+    runs: Vec<Labelled<'a>>,
+    styles: Styles,
+    limits: DrawnLimits,
+    notes: Vec<String>,
+}
+
+/// A run with its trace.
+struct Traced<'a> {
+    run: Labelled<'a>,
+    trace: Trace,
+}
+
+impl<'a> Studio<'a> {
+    /// Runs of a scenario.
+    fn runs_of(&self, suite: &str, scenario: &str) -> Vec<Labelled<'a>> {
+        let here = |l: &&Labelled<'a>| l.row.suite == suite && l.row.scenario == scenario;
+        self.runs.iter().filter(here).cloned().collect()
+    }
+
+    /// Runs of a suite.
+    fn runs_of_suite(&self, suite: &str) -> Vec<Labelled<'a>> {
+        self.runs.iter().filter(|l| l.row.suite == suite).cloned().collect()
+    }
+
+    /// Those of the runs that have a trace with at least one sample. The others are noted.
+    fn with_traces(&mut self, runs: Vec<Labelled<'a>>) -> Result<Vec<Traced<'a>>, Obstacle> {
+        let mut traced = Vec::new();
+        for run in runs {
+            match self.trace(run.row)? {
+                Some(trace) => traced.push(Traced { run, trace }),
+                None if run.row.metrics.is_none() => self.miss(&run, "the method declined"),
+                None => self.miss(&run, "no trace"),
+            }
+        }
+        Ok(traced)
+    }
+
+    fn trace(&self, row: &Row) -> Result<Option<Trace>, RecordError> {
+        let Some(relative) = &row.trace else { return Ok(None) };
+        let path = self.dir.join(relative);
+        if !path.exists() {
+            return Ok(None);
+        }
+        read_trace(&path).map(|t| (!t.rows.is_empty()).then_some(t))
+    }
+
+    fn miss(&mut self, run: &Labelled<'_>, reason: &str) {
+        self.notes.push(format!("{} on {}/{}: {reason}", run.full(), run.row.suite, run.row.scenario));
+    }
+}
+
+/// Keeps, per suite, the runs with the Δt of the last row.
+fn of_last_dt(runs: Vec<Labelled<'_>>) -> Vec<Labelled<'_>> {
+    let last_dt = |suite: &str| {
+        runs.iter().rev().find(|l| l.row.suite == suite).map(|l| l.row.dt_s.to_bits())
+    };
+    let keep: Vec<bool> = runs.iter().map(|l| last_dt(&l.row.suite) == Some(l.row.dt_s.to_bits())).collect();
+    runs.into_iter().zip(keep).filter(|(_, k)| *k).map(|(l, _)| l).collect()
+}
+
+/// Points (t, value) of a column; none if the trace lacks it.
+fn over_time(trace: &Trace, column: &str) -> Option<Vec<(f64, f64)>> {
+    Some(trace.column("t")?.into_iter().zip(trace.column(column)?).collect())
+}
+
+/// Points (t_k, (q_k − q_{k−1})/(t_k − t_{k−1})), k ≥ 1, of a column; none if the trace lacks it.
+fn rate_over_time(trace: &Trace, column: &str) -> Option<Vec<(f64, f64)>> {
+    let points = over_time(trace, column)?;
+    Some(points.windows(2).map(|w| (w[1].0, (w[1].1 - w[0].1) / (w[1].0 - w[0].0))).collect())
+}
+
+/// Suite, scenario and Δt as they stand in a title.
+fn place_of(run: &Labelled<'_>) -> String {
+    format!("{}, scenario {}, Δt = {} ms", run.row.suite, run.row.scenario, milliseconds(run.row.dt_s))
+}
+
+fn milliseconds(seconds: f64) -> f64 {
+    // Rounded to a nanosecond: 0.005 s is 5 ms, not 5.000000000000001.
+    (seconds * 1e9).round() / 1e6
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,3 @@
+//! The `ik-bench` command.
+
+fn main() {}

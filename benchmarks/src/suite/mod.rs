@@ -1,0 +1,173 @@
+//! Suites: scenarios for one problem, who competes in them, and how to read the result, as TOML.
+
+mod case;
+mod lineup;
+mod problem_spec;
+
+pub use case::{Case, Variation};
+pub use lineup::{Selection, lineup};
+pub use problem_spec::{LimitsSpec, PrioritySpec, ProblemSpec, RobotSpec, TaskSpec, TrackSpec};
+
+use crate::error::InputError;
+use crate::trajectory::MotionSpec;
+use ik_core::boundary::Boundary;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// A suite as it is written.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Suite {
+    /// Id, e.g. `coman/squat`.
+    pub id: String,
+    /// What it is about, in one line.
+    pub title: String,
+    /// What it shows, what to look for, and what not to conclude.
+    pub analysis: String,
+    /// Time step (s).
+    pub dt_s: f64,
+    /// Largest centre-of-mass error of a run that survives (m).
+    pub com_tolerance_m: f64,
+    /// Joints whose exit from the straight leg is timed.
+    #[serde(default)]
+    pub exit_joints: Vec<String>,
+    /// Frames that carry the robot where static torques are asked for.
+    #[serde(default)]
+    pub torque_supports: Vec<String>,
+    /// The problem of all scenarios.
+    pub problem: ProblemSpec,
+    /// Named start configurations.
+    pub starts: BTreeMap<String, StartSpec>,
+    /// The scenarios.
+    pub scenarios: Vec<ScenarioSpec>,
+    /// Who competes; without it, every registered method with its usual budgets.
+    #[serde(default)]
+    pub contestants: Vec<ContestantSpec>,
+    /// Where it was read from, for messages.
+    #[serde(skip)]
+    pub source: String,
+}
+
+/// A start configuration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StartSpec {
+    /// Position of a floating root (m, world).
+    #[serde(default)]
+    pub base_position_m: Option<[f64; 3]>,
+    /// Roll, pitch, yaw of a floating root (rad).
+    #[serde(default)]
+    pub base_rpy_rad: Option<[f64; 3]>,
+    /// Joints by name (rad or m); those not named are 0.
+    #[serde(default)]
+    pub joints: BTreeMap<String, f64>,
+}
+
+/// A motion from a start.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScenarioSpec {
+    /// Id, unique in the suite.
+    pub id: String,
+    /// Whether `--quick` keeps it.
+    #[serde(default)]
+    pub quick: bool,
+    /// Duration (s).
+    pub duration_s: f64,
+    /// Name of the start.
+    pub start: String,
+    /// The terms that move the targets; tasks without one keep their value at the start.
+    #[serde(default)]
+    pub motion: Vec<MotionSpec>,
+    /// Boundary in place of the problem's.
+    #[serde(default)]
+    pub boundary: Option<Boundary>,
+}
+
+/// A competing method, or several: lists in `set` are multiplied out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContestantSpec {
+    /// Id of the method; `*` is every registered one with its usual budgets.
+    pub method: String,
+    /// Parameter values, or lists of values.
+    #[serde(default)]
+    pub set: toml::Table,
+}
+
+/// The suites that come with the program: id and text.
+pub const EMBEDDED: &[(&str, &str)] = &[
+    ("coman/squat", include_str!("../../suites/coman/squat.toml")),
+    ("coman/stretch", include_str!("../../suites/coman/stretch.toml")),
+    ("coman/asymmetric", include_str!("../../suites/coman/asymmetric.toml")),
+    ("coman/lean", include_str!("../../suites/coman/lean.toml")),
+    ("coman/boundary", include_str!("../../suites/coman/boundary.toml")),
+    ("coman/regulator", include_str!("../../suites/coman/regulator.toml")),
+    ("coman/posture", include_str!("../../suites/coman/posture.toml")),
+];
+
+impl Suite {
+    /// The suite of that id, or in that file (a name that ends in `.toml`).
+    ///
+    /// # Errors
+    /// An unknown id, a file that cannot be read or is no suite.
+    pub fn load(name: &str) -> Result<Self, InputError> {
+        if let Some((id, text)) = EMBEDDED.iter().find(|(id, _)| *id == name) {
+            return Self::parse(text, &format!("suite {id}"), Path::new("."));
+        }
+        if !name.ends_with(".toml") {
+            let known = EMBEDDED.iter().map(|(id, _)| *id).chain(["or the path of a .toml file"]);
+            return Err(InputError::unknown("command line", "suite", name, known));
+        }
+        let text = std::fs::read_to_string(name)
+            .map_err(|e| InputError::File { file: name.to_owned(), reason: e.to_string() })?;
+        Self::parse(&text, name, Path::new(name).parent().unwrap_or(Path::new(".")))
+    }
+
+    /// All embedded suites.
+    ///
+    /// # Errors
+    /// As [`Suite::load`]; a test shows that there is none.
+    pub fn load_embedded() -> Result<Vec<Self>, InputError> {
+        EMBEDDED.iter().map(|(id, _)| Self::load(id)).collect()
+    }
+
+    /// Reads a suite; `source` stands for it in messages, files it names are relative to `folder`.
+    ///
+    /// # Errors
+    /// Text that is no suite, with line and column; ids that are no ids, no scenario.
+    pub fn parse(text: &str, source: &str, folder: &Path) -> Result<Self, InputError> {
+        let syntax = |e: toml::de::Error| {
+            InputError::Syntax { file: source.to_owned(), reason: e.to_string().trim_end().to_owned() }
+        };
+        let mut suite: Self = toml::from_str(text).map_err(syntax)?;
+        source.clone_into(&mut suite.source);
+        suite.problem.robot = suite.problem.robot.inlined(folder)?;
+        check_id(&suite.id, "id", source, "/")?;
+        if suite.scenarios.is_empty() {
+            return Err(InputError::value(source, "scenarios", "empty", "at least one"));
+        }
+        for (i, scenario) in suite.scenarios.iter().enumerate() {
+            let field = format!("scenarios[{i}].id");
+            check_id(&scenario.id, &field, source, "")?;
+            if suite.scenarios[..i].iter().any(|other| other.id == scenario.id) {
+                return Err(InputError::value(source, &field, &scenario.id, "ids that differ"));
+            }
+        }
+        Ok(suite)
+    }
+}
+
+/// Ids become names of files.
+fn check_id(id: &str, field: &str, source: &str, also: &str) -> Result<(), InputError> {
+    let good = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c) || also.contains(c);
+    if !id.is_empty() && id.chars().all(good) {
+        return Ok(());
+    }
+    let allowed = format!("letters, digits and any of `._-{also}`");
+    Err(InputError::value(source, field, format!("`{id}`"), &allowed))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,154 @@
+//! A trajectory: the values of all tasks at the start configuration plus the terms of a motion.
+//!
+//! Values are kept in *plain* coordinates, one number per task row, orientations as roll, pitch and yaw: terms act on
+//! single components, and the rates of the components are exact. How the problem writes orientations matters only when
+//! a trajectory is sampled.
+
+use super::shape::Shape;
+use crate::error::{InputError, finite};
+use ik_core::kinematics::{Page, forward};
+use ik_core::problem::Problem;
+use ik_core::robot::{FrameId, Robot};
+use ik_core::spatial::rpy;
+use ik_core::task::Track;
+use serde::{Deserialize, Serialize};
+
+/// One term of a scenario's motion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MotionSpec {
+    /// Name of the task.
+    pub task: String,
+    /// Name of the component: `x y z`, `roll pitch yaw`, or a joint of a posture.
+    pub component: String,
+    /// The function of time.
+    pub shape: Shape,
+    /// When its time starts (s); before that it contributes nothing.
+    #[serde(default)]
+    pub from_s: f64,
+    /// When it ends (s), itself excluded; from then on it contributes nothing. Without it, it never ends.
+    #[serde(default)]
+    pub until_s: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Term {
+    row: usize,
+    shape: Shape,
+    from_s: f64,
+    until_s: f64,
+}
+
+/// Targets of all tasks as functions of time, in plain coordinates.
+#[derive(Clone, Debug)]
+pub struct Trajectory {
+    base: Vec<f64>,
+    terms: Vec<Term>,
+}
+
+impl Trajectory {
+    /// The motion of a robot that starts at `q_start` (length nq). `place` and `field` (the path of the list of terms) go
+    /// into messages.
+    ///
+    /// # Errors
+    /// An unknown task or component, a number that cannot be, two constants for one component.
+    pub fn new(
+        problem: &Problem,
+        q_start: &[f64],
+        motion: &[MotionSpec],
+        place: &str,
+        field: &str,
+    ) -> Result<Self, InputError> {
+        let mut base = task_values(problem, q_start);
+        let (mut terms, mut held) = (Vec::new(), Vec::new());
+        for (i, spec) in motion.iter().enumerate() {
+            let field = format!("{field}[{i}]");
+            let term = term(problem, spec, place, &field)?;
+            let Shape::Hold { value } = spec.shape else {
+                terms.push(term);
+                continue;
+            };
+            if held.contains(&term.row) {
+                return Err(InputError::value(place, &field, "a second hold", "one hold per component"));
+            }
+            held.push(term.row);
+            base[term.row] = value;
+        }
+        Ok(Self { base, terms })
+    }
+
+    /// Writes the values at `t` (s), one per task row (m, or rad with orientations as roll, pitch, yaw).
+    pub fn value_into(&self, t: f64, out: &mut [f64]) {
+        out.copy_from_slice(&self.base);
+        for term in self.active(t) {
+            out[term.row] += term.shape.value(t - term.from_s);
+        }
+    }
+
+    /// Writes the exact time derivatives of the values at `t` (s).
+    pub fn rate_into(&self, t: f64, out: &mut [f64]) {
+        out.fill(0.0);
+        for term in self.active(t) {
+            out[term.row] += term.shape.rate(t - term.from_s);
+        }
+    }
+
+    fn active(&self, t: f64) -> impl Iterator<Item = &Term> {
+        self.terms.iter().filter(move |term| term.from_s <= t && t < term.until_s)
+    }
+}
+
+fn term(problem: &Problem, spec: &MotionSpec, place: &str, field: &str) -> Result<Term, InputError> {
+    let tasks = problem.tasks();
+    let Some(index) = tasks.iter().position(|t| t.name == spec.task) else {
+        let place = format!("{place}: {field}.task");
+        return Err(InputError::unknown(&place, "task", &spec.task, tasks.iter().map(|t| &t.name)));
+    };
+    let names = component_names(problem.robot(), &tasks[index].track);
+    let Some(component) = names.iter().position(|n| *n == spec.component) else {
+        let place = format!("{place}: {field}.component");
+        return Err(InputError::unknown(&place, "component", &spec.component, names));
+    };
+    spec.shape.check(place, &format!("{field}.shape"))?;
+    finite(place, &format!("{field}.from_s"), spec.from_s)?;
+    let until_s = spec.until_s.unwrap_or(f64::INFINITY);
+    let windowed = spec.from_s > 0.0 || spec.until_s.is_some();
+    if windowed && matches!(spec.shape, Shape::Hold { .. }) {
+        return Err(InputError::value(place, field, "a hold with from_s or until_s", "a hold for the whole motion"));
+    }
+    if until_s.is_nan() || until_s <= spec.from_s {
+        let allowed = format!("a number above from_s = {}", spec.from_s);
+        return Err(InputError::value(place, &format!("{field}.until_s"), until_s, &allowed));
+    }
+    Ok(Term { row: problem.slots()[index].xdot + component, shape: spec.shape, from_s: spec.from_s, until_s })
+}
+
+/// Names of the rows of a task, in their order.
+pub(crate) fn component_names<'a>(robot: &'a Robot, track: &Track) -> Vec<&'a str> {
+    match track {
+        Track::Position(_) | Track::CentreOfMass => vec!["x", "y", "z"],
+        Track::Orientation(_) => vec!["roll", "pitch", "yaw"],
+        Track::Pose(_) => vec!["x", "y", "z", "roll", "pitch", "yaw"],
+        Track::Posture => robot.coordinates().iter().map(|c| c.name.as_str()).collect(),
+    }
+}
+
+/// Values of all tasks at `q` (length nq), in plain coordinates.
+pub(crate) fn task_values(problem: &Problem, q: &[f64]) -> Vec<f64> {
+    let robot = problem.robot();
+    let mut page = Page::new(robot);
+    forward(robot, q, &mut page);
+    let position = |f: FrameId| page.frame_position(robot, f);
+    let attitude = |f: FrameId| rpy::from_matrix(&page.frame_rotation(robot, f));
+    let mut values = Vec::with_capacity(problem.nxdot());
+    for task in problem.tasks() {
+        match task.track {
+            Track::Position(f) => values.extend(position(f).iter()),
+            Track::Orientation(f) => values.extend(attitude(f).iter()),
+            Track::Pose(f) => values.extend(position(f).iter().chain(attitude(f).iter())),
+            Track::CentreOfMass => values.extend(page.centre_of_mass().iter()),
+            Track::Posture => values.extend(&q[robot.root().nq()..]),
+        }
+    }
+    values
+}

@@ -1,0 +1,216 @@
+//! Baselines: the position problem as a user of a general optimiser would write it, hard rows and limits as penalties.
+//!
+//! ```text
+//! minimise over d ∈ Rⁿ   ½ ‖e_s(q)‖² + ½ ρ ‖e_h(q)‖² + ½ ρ ‖d − clamp(d, lo, hi)‖²,    q = q⁻ ⊕ d
+//! ```
+//!
+//! They prove that the seam takes a foreign optimiser, and they are what a specialised method has to beat. The optimiser
+//! (argmin) allocates and owns its loop; its iterations are counted as majors after it returns, and it is told the budget
+//! before it starts.
+
+mod penalty_cg;
+mod penalty_lbfgs;
+
+pub use penalty_cg::{PenaltyCg, PenaltyCgParameters};
+pub use penalty_lbfgs::{PenaltyLbfgs, PenaltyLbfgsParameters};
+
+use crate::registry::{Allowed, Field};
+use crate::step_qp::{finish_unbounded, stay};
+use argmin::core::{CostFunction, Error, Gradient};
+use ik_core::configuration::integrate_into;
+use ik_core::evaluator::{Evaluator, Linearisation};
+use ik_core::formulation::{
+    Honours, Prepared, Solution, Stepper, Termination, Trust, Use,
+};
+use ik_core::problem::Problem;
+use ik_core::spatial::so3;
+use ik_core::step::ControlStep;
+use nalgebra::Vector3;
+use std::cell::RefCell;
+use std::sync::Arc;
+
+const PENALTY_FIELD: Field = Field {
+    key: "penalty",
+    unit: "-",
+    meaning: "weight of hard rows and of limits against the compromised rows",
+    allowed: Allowed::Number { least: 1e-6, largest: 1e12 },
+};
+
+const TOLERANCE_FIELD: Field = Field {
+    key: "gradient_tolerance",
+    unit: "m, rad",
+    meaning: "a gradient norm below this counts as converged",
+    allowed: Allowed::Number { least: 1e-15, largest: 1.0 },
+};
+
+/// The penalised problem of one step, as argmin wants it: cost and gradient through `&self`.
+struct Penalised<'a> {
+    problem: &'a Problem,
+    step: &'a ControlStep<'a>,
+    penalty: f64,
+    state: RefCell<State<'a>>,
+}
+
+struct State<'a> {
+    eval: &'a mut Evaluator,
+    scratch: &'a mut Scratch,
+    best_cost: f64,
+}
+
+/// What a stepper keeps between steps.
+#[derive(Debug)]
+struct Scratch {
+    lin: Linearisation,
+    q: Vec<f64>,
+    best: Vec<f64>,
+}
+
+impl Penalised<'_> {
+    /// Cost and gradient at `d`; remembers the best point seen, which survives a line search that fails.
+    fn evaluate(&self, d: &[f64]) -> (f64, Vec<f64>) {
+        let state = &mut *self.state.borrow_mut();
+        let Scratch { lin, q, best } = &mut *state.scratch;
+        integrate_into(self.problem.robot(), self.step.q_prev, d, q);
+        state.eval.linearise(q, self.step.phase, self.step.targets.now(), lin);
+        let mut gradient = vec![0.0; d.len()];
+        lin.soft.add_transposed(&lin.soft.error, 1.0, &mut gradient);
+        lin.hard.add_transposed(&lin.hard.error, self.penalty, &mut gradient);
+        to_chart(self.problem, d, &mut gradient);
+        let squares = |e: &[f64]| e.iter().map(|e| e * e).sum::<f64>();
+        let mut cost = 0.5 * squares(&lin.soft.error) + 0.5 * self.penalty * squares(&lin.hard.error);
+        let bounds = self.step.bounds.lo.iter().zip(self.step.bounds.hi);
+        for ((d, g), (lo, hi)) in d.iter().zip(&mut gradient).zip(bounds) {
+            let excess = d - d.max(*lo).min(*hi);
+            cost += 0.5 * self.penalty * excess * excess;
+            *g += self.penalty * excess;
+        }
+        if cost < state.best_cost {
+            state.best_cost = cost;
+            best.copy_from_slice(d);
+        }
+        (cost, gradient)
+    }
+}
+
+/// Gradients come in the tangent space at q; argmin works in the chart d around q⁻: `∂/∂d = J_l(d)ᵀ ∂` for the root's
+/// rotation.
+fn to_chart(problem: &Problem, d: &[f64], gradient: &mut [f64]) {
+    if problem.robot().root() == ik_core::robot::Root::Floating {
+        let inverse = so3::left_jacobian_inverse(&Vector3::new(d[3], d[4], d[5]));
+        if let Some(jacobian) = inverse.try_inverse() {
+            let turned = jacobian.transpose() * Vector3::new(gradient[3], gradient[4], gradient[5]);
+            gradient[3..6].copy_from_slice(turned.as_slice());
+        }
+    }
+}
+
+impl CostFunction for Penalised<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+    fn cost(&self, d: &Vec<f64>) -> Result<f64, Error> {
+        Ok(self.evaluate(d).0)
+    }
+}
+
+impl Gradient for Penalised<'_> {
+    type Param = Vec<f64>;
+    type Gradient = Vec<f64>;
+    fn gradient(&self, d: &Vec<f64>) -> Result<Vec<f64>, Error> {
+        Ok(self.evaluate(d).1)
+    }
+}
+
+/// Runs an argmin solver on the penalised problem from `d = 0` for at most so many iterations; returns how many it took.
+trait Optimiser: Send + std::fmt::Debug + 'static {
+    fn run(&self, problem: Penalised<'_>, start: Vec<f64>, most: u32) -> u32;
+}
+
+/// The stepper of both baselines.
+#[derive(Debug)]
+struct PenaltyStepper<O> {
+    problem: Arc<Problem>,
+    optimiser: O,
+    penalty: f64,
+    gradient_tolerance: f64,
+    scratch: Scratch,
+}
+
+impl<O: Optimiser> Stepper for PenaltyStepper<O> {
+    fn step(&mut self, step: &ControlStep<'_>, eval: &mut Evaluator, out: &mut Solution) -> Termination {
+        stay(step, out);
+        let most = eval.meter.majors_left();
+        if most == 0 {
+            return Termination::Budget;
+        }
+        self.scratch.best.fill(0.0);
+        let start = vec![0.0; self.problem.robot().nv()];
+        let taken = {
+            let state = State { eval, scratch: &mut self.scratch, best_cost: f64::INFINITY };
+            let penalised =
+                Penalised { problem: &self.problem, step, penalty: self.penalty, state: RefCell::new(state) };
+            self.optimiser.run(penalised, start, most)
+        };
+        for _ in 0..taken.clamp(1, most) {
+            eval.meter.next_major();
+        }
+        let best = self.scratch.best.clone();
+        finish_unbounded(&self.problem, step, &best, out);
+        eval.linearise(&out.q, step.phase, step.targets.now(), &mut self.scratch.lin);
+        if self.scratch.lin.soft.error.iter().chain(&self.scratch.lin.hard.error).any(|e| !e.is_finite()) {
+            stay(step, out);
+            return Termination::Numerical("the cost is not finite");
+        }
+        let converged = self.gradient_norm(step, &best) < self.gradient_tolerance;
+        if converged { Termination::Converged } else { Termination::Budget }
+    }
+
+    fn reset(&mut self) {}
+}
+
+impl<O> PenaltyStepper<O> {
+    /// Norm of the penalised gradient at the linearised point.
+    fn gradient_norm(&self, step: &ControlStep<'_>, d: &[f64]) -> f64 {
+        let lin = &self.scratch.lin;
+        let mut gradient = vec![0.0; d.len()];
+        lin.soft.add_transposed(&lin.soft.error, 1.0, &mut gradient);
+        lin.hard.add_transposed(&lin.hard.error, self.penalty, &mut gradient);
+        for (i, g) in gradient.iter_mut().enumerate() {
+            *g += self.penalty * (d[i] - d[i].max(step.bounds.lo[i]).min(step.bounds.hi[i]));
+        }
+        gradient.iter().map(|g| g * g).sum::<f64>().sqrt()
+    }
+}
+
+fn prepare<O: Optimiser>(
+    problem: &Arc<Problem>,
+    optimiser: O,
+    n: u32,
+    penalty: f64,
+    gradient_tolerance: f64,
+) -> Prepared {
+    let robot = problem.robot();
+    let stepper = PenaltyStepper {
+        problem: Arc::clone(problem),
+        optimiser,
+        penalty,
+        gradient_tolerance,
+        scratch: Scratch {
+            lin: Linearisation::new(problem),
+            q: vec![0.0; robot.nq()],
+            best: vec![0.0; robot.nv()],
+        },
+    };
+    let honours = Honours {
+        boundary: false,
+        hard_rows: false,
+        objective: Use::Ignored,
+        allocation_free: false,
+        counts: Trust::Declared,
+    };
+    Prepared {
+        stepper: Box::new(stepper),
+        majors: n,
+        honours,
+        notes: vec!["hard rows and limits are penalties: both are violated a little".into()],
+    }
+}

@@ -1,0 +1,277 @@
+//! Sequential quadratic programming on positions, which IK4 and IK5 share.
+//!
+//! ```text
+//! minimise ½ ‖r(q)‖²    subject to  c(q) = 0,   lo ≤ q ⊖ q⁻ ≤ hi
+//! ```
+//!
+//! Each major linearises residuals r and hard rows c exactly (second-order kinematics included), takes the Gauss–Newton
+//! Hessian plus a proximal weight μ around the iterate (which vanishes at the solution), solves the quadratic program and
+//! searches along its step on the L1 merit ½‖r‖² + ρ‖c‖₁. It stops when the step is below the tolerance; the gradient of
+//! the Lagrangian is then below (‖A‖² + μ) times the tolerance, so step size and KKT residual end together. It never stops
+//! on a small decrease: leaving a straight knee gains only 1e-9 m² at first (notes §3).
+
+use crate::gauss_newton::largest;
+use crate::qp::{Outcome, QpStatus};
+use crate::start::{Escape, StartParameters};
+use crate::step_qp::{Stack, StepQp, conclude, finish, stay};
+use ik_core::configuration::{difference_into, integrate_into};
+use ik_core::evaluator::{Evaluator, Linearisation};
+use ik_core::formulation::{Solution, Termination};
+use ik_core::problem::Problem;
+use ik_core::step::ControlStep;
+use std::sync::Arc;
+
+/// ρ is this many times the largest multiplier: just above 1, since a penalty far beyond the multipliers rejects good
+/// steps near small objectives (notes §5, Maratos effect).
+const PENALTY_FACTOR: f64 = 1.5;
+
+/// Fraction of the predicted decrease a step must bring (Armijo).
+const SUFFICIENT: f64 = 1e-4;
+
+/// Most halvings of a step.
+const HALVINGS: u32 = 8;
+
+/// Merit changes below this fraction of the merit's size are rounding.
+const ROUNDING: f64 = 1e-14;
+
+/// What makes r and c out of a linearisation: the formulation's equations.
+pub(crate) trait Model: Send + std::fmt::Debug {
+    /// Soft rows, at most, for this many task rows.
+    fn soft_rows(rows: usize) -> usize
+    where
+        Self: Sized;
+
+    /// Writes r, c and their exact Jacobians at an iterate `dq` from q⁻. The second-order terms of `lin` are filled.
+    fn assemble(&self, lin: &Linearisation, dq: &[f64], dt_s: f64, out: &mut Residuals);
+
+    /// Weight of the Hessian of soft row i in the Hessian of ½‖r‖² at dq = 0, for error e_i and rate ẋ_i Δt.
+    fn curvature_weight(&self, error: f64, rate_dt: f64) -> f64;
+}
+
+/// r, c and their Jacobians; column-major, padded.
+#[derive(Clone, Debug)]
+pub(crate) struct Residuals {
+    pub(crate) soft: Block,
+    pub(crate) hard: Block,
+}
+
+/// Rows of one kind.
+#[derive(Clone, Debug)]
+pub(crate) struct Block {
+    pub(crate) matrix: Vec<f64>,
+    pub(crate) residual: Vec<f64>,
+    /// `J dq` scratch.
+    pub(crate) motion: Vec<f64>,
+    pub(crate) ld: usize,
+    pub(crate) rows: usize,
+}
+
+impl Block {
+    pub(crate) fn new(rows: usize, cols: usize) -> Self {
+        let ld = rows.next_multiple_of(4).max(4);
+        Self { matrix: vec![0.0; ld * cols], residual: vec![0.0; ld], motion: vec![0.0; ld], ld, rows }
+    }
+
+    pub(crate) fn stack(&self) -> Stack<'_> {
+        Stack { matrix: &self.matrix, ld: self.ld, residual: &self.residual }
+    }
+
+    /// `‖residual + A d‖₁` for d = 0 and for `d`.
+    fn absolute_sums(&mut self, d: &[f64]) -> (f64, f64) {
+        let now = self.residual[..self.rows].iter().map(|r| r.abs()).sum();
+        self.motion.copy_from_slice(&self.residual);
+        for (column, d) in self.matrix.chunks_exact(self.ld).zip(d) {
+            self.motion.iter_mut().zip(column).for_each(|(m, c)| *m += c * d);
+        }
+        (now, self.motion[..self.rows].iter().map(|r| r.abs()).sum())
+    }
+}
+
+/// Parameters of the iteration.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SqpParameters {
+    pub(crate) proximal: f64,
+    pub(crate) step_tolerance: f64,
+    pub(crate) start: StartParameters,
+}
+
+/// The iteration and its memory.
+#[derive(Debug)]
+pub(crate) struct Sqp<M> {
+    problem: Arc<Problem>,
+    model: M,
+    parameters: SqpParameters,
+    qp: StepQp,
+    escape: Escape,
+    now: Point,
+    trial: Point,
+}
+
+/// An iterate with everything evaluated there.
+#[derive(Clone, Debug)]
+struct Point {
+    q: Vec<f64>,
+    dq: Vec<f64>,
+    lin: Linearisation,
+    residuals: Residuals,
+    /// ½‖r‖².
+    half_squares: f64,
+    /// ‖c‖₁.
+    violation: f64,
+}
+
+impl<M: Model> Sqp<M> {
+    pub(crate) fn new(problem: &Arc<Problem>, model: M, parameters: SqpParameters) -> Self {
+        let (nq, nv) = (problem.robot().nq(), problem.robot().nv());
+        let point = Point {
+            q: vec![0.0; nq],
+            dq: vec![0.0; nv],
+            lin: Linearisation::new(problem),
+            residuals: Residuals {
+                soft: Block::new(M::soft_rows(problem.largest_soft_rows()), nv),
+                hard: Block::new(problem.largest_hard_rows(), nv),
+            },
+            half_squares: 0.0,
+            violation: 0.0,
+        };
+        Self {
+            problem: Arc::clone(problem),
+            model,
+            parameters,
+            qp: StepQp::new(problem),
+            escape: Escape::new(problem, parameters.start),
+            now: point.clone(),
+            trial: point,
+        }
+    }
+
+    pub(crate) fn reset(&mut self) {
+        self.qp.reset();
+    }
+
+    pub(crate) fn step(
+        &mut self,
+        step: &ControlStep<'_>,
+        eval: &mut Evaluator,
+        out: &mut Solution,
+    ) -> Termination {
+        stay(step, out);
+        if eval.meter.majors_left() == 0 {
+            return Termination::Budget;
+        }
+        self.qp.reset();
+        self.escape.start(&self.model, step, eval, &mut self.now.dq);
+        integrate_into(self.problem.robot(), step.q_prev, &self.now.dq, &mut self.now.q);
+        self.evaluate(step, eval, Which::Now);
+        let (ended, outcome) = self.iterate(step, eval, out);
+        finish(&self.problem, step, &mut self.now.dq, out);
+        conclude(outcome, ended, step, out)
+    }
+
+    fn iterate(
+        &mut self,
+        step: &ControlStep<'_>,
+        eval: &mut Evaluator,
+        out: &mut Solution,
+    ) -> (Termination, Outcome) {
+        let mut outcome = Outcome::Solved;
+        while eval.meter.next_major() {
+            outcome = self.solve_qp(step, eval);
+            if matches!(outcome, Outcome::Failed(_)) {
+                break;
+            }
+            if !self.now.half_squares.is_finite() {
+                return (Termination::Budget, Outcome::Failed(QpStatus::Numerical));
+            }
+            if largest(&self.qp.solution.x) < self.parameters.step_tolerance {
+                if outcome == Outcome::Solved {
+                    self.claim(out);
+                }
+                self.move_trial(step);
+                std::mem::swap(&mut self.now, &mut self.trial);
+                return (Termination::Converged, outcome);
+            }
+            self.line_search(step, eval);
+        }
+        (Termination::Budget, outcome)
+    }
+
+    fn solve_qp(&mut self, step: &ControlStep<'_>, eval: &mut Evaluator) -> Outcome {
+        self.qp.start(self.parameters.proximal);
+        self.qp.add(self.now.residuals.soft.stack());
+        self.qp.bound(&step.bounds, &self.now.dq);
+        let hard = &self.now.residuals.hard;
+        self.qp.solve(hard.stack(), hard.rows, eval)
+    }
+
+    /// Moves to the first of 1, ½, ¼ … of the step that brings enough; the last one is taken as it is, since standing
+    /// still would only repeat the same program.
+    fn line_search(&mut self, step: &ControlStep<'_>, eval: &mut Evaluator) {
+        let rho = PENALTY_FACTOR * largest(&self.qp.solution.y);
+        let (violated, predicted) = self.now.residuals.hard.absolute_sums(&self.qp.solution.x);
+        let slope = dot(&self.qp.gradient, &self.qp.solution.x) - rho * (violated - predicted);
+        let merit = self.now.half_squares + rho * self.now.violation;
+        let mut t = 1.0;
+        for halving in 0..=HALVINGS {
+            self.move_trial(step);
+            self.evaluate(step, eval, Which::Trial);
+            let reached = self.trial.half_squares + rho * self.trial.violation;
+            let enough = merit + SUFFICIENT * t * slope.min(0.0) + ROUNDING * merit;
+            if reached <= enough || halving == HALVINGS {
+                break;
+            }
+            t *= 0.5;
+            self.qp.solution.x.iter_mut().for_each(|d| *d *= 0.5);
+        }
+        std::mem::swap(&mut self.now, &mut self.trial);
+    }
+
+    /// Puts the trial point one program step away from the iterate.
+    fn move_trial(&mut self, step: &ControlStep<'_>) {
+        let robot = self.problem.robot();
+        integrate_into(robot, &self.now.q, &self.qp.solution.x, &mut self.trial.q);
+        difference_into(robot, step.q_prev, &self.trial.q, &mut self.trial.dq);
+    }
+
+    fn evaluate(&mut self, step: &ControlStep<'_>, eval: &mut Evaluator, which: Which) {
+        let point = match which {
+            Which::Now => &mut self.now,
+            Which::Trial => &mut self.trial,
+        };
+        let target = step.targets.now();
+        eval.linearise(&point.q, step.phase, target, &mut point.lin);
+        eval.velocity_derivative(&mut point.lin, target, &point.dq);
+        self.model.assemble(&point.lin, &point.dq, step.dt_s, &mut point.residuals);
+        point.half_squares = 0.5 * point.residuals.soft.residual.iter().map(|r| r * r).sum::<f64>();
+        let hard = &point.residuals.hard;
+        point.violation = hard.residual[..hard.rows].iter().map(|c| c.abs()).sum();
+    }
+
+    /// Multipliers of the last program, with everything but the plain task rows as the method's own gradient.
+    fn claim(&mut self, out: &mut Solution) {
+        let (lin, residuals) = (&self.now.lin, &self.now.residuals);
+        let (hard, m) = (&residuals.hard, residuals.hard.rows);
+        let claim = &mut out.claim;
+        claim.has = true;
+        claim.hard.fill(0.0);
+        claim.hard[..m].copy_from_slice(&self.qp.solution.y[..m]);
+        claim.bound.copy_from_slice(&self.qp.solution.z);
+        claim.own.copy_from_slice(&self.qp.gradient);
+        lin.soft.add_transposed(&lin.soft.error, -1.0, &mut claim.own);
+        let rows = lin.hard.jacobian.chunks_exact(lin.hard.ld()).zip(hard.matrix.chunks_exact(hard.ld));
+        for (own, (plain, full)) in claim.own.iter_mut().zip(rows) {
+            let difference = full.iter().zip(plain).zip(&self.qp.solution.y[..m]);
+            *own -= difference.map(|((f, p), y)| (f - p) * y).sum::<f64>();
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Which {
+    Now,
+    Trial,
+}
+
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,166 @@
+//! The quadratic program of one major iteration, which the formulations share:
+//!
+//! ```text
+//! minimise ½ ‖A_s d + r_s‖² + ½ dᵀ D d    subject to  A_h d = −r_h,   lo ≤ d ≤ hi
+//! ```
+//!
+//! with any number of stacks of soft rows. It only assembles and solves; what the rows mean is the formulation's affair.
+
+use crate::qp::{Lexicographic, MatRef, Outcome, Qp, QpSolution, QpStatus};
+use ik_core::evaluator::Evaluator;
+use ik_core::formulation::{Solution, Termination};
+use ik_core::problem::Problem;
+use ik_core::step::{Bounds, ControlStep};
+
+/// A stack of rows `A d + r`, column-major with leading dimension `ld`; padding rows are zero.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stack<'a> {
+    pub(crate) matrix: &'a [f64],
+    pub(crate) ld: usize,
+    pub(crate) residual: &'a [f64],
+}
+
+/// Assembles and solves; sized once.
+#[derive(Clone, Debug)]
+pub(crate) struct StepQp {
+    hessian: Vec<f64>,
+    pub(crate) gradient: Vec<f64>,
+    pub(crate) lo: Vec<f64>,
+    pub(crate) hi: Vec<f64>,
+    right: Vec<f64>,
+    solver: Lexicographic,
+    pub(crate) solution: QpSolution,
+}
+
+impl StepQp {
+    pub(crate) fn new(problem: &Problem) -> Self {
+        let (n, m) = (problem.robot().nv(), problem.largest_hard_rows());
+        Self {
+            hessian: vec![0.0; n * n],
+            gradient: vec![0.0; n],
+            lo: vec![f64::NEG_INFINITY; n],
+            hi: vec![f64::INFINITY; n],
+            right: vec![0.0; m],
+            solver: Lexicographic::new(n, m),
+            solution: QpSolution::new(n, m),
+        }
+    }
+
+    /// Forgets the active set.
+    pub(crate) fn reset(&mut self) {
+        self.solver.reset();
+    }
+
+    /// An objective of `½ weight ‖d‖²` alone.
+    pub(crate) fn start(&mut self, weight: f64) {
+        let n = self.gradient.len();
+        self.hessian.fill(0.0);
+        self.gradient.fill(0.0);
+        self.hessian.iter_mut().step_by(n + 1).for_each(|h| *h = weight);
+    }
+
+    /// Adds `½ ‖A d + r‖²`.
+    pub(crate) fn add(&mut self, stack: Stack<'_>) {
+        let n = self.gradient.len();
+        let ld = stack.ld;
+        let columns = || stack.matrix.chunks_exact(ld);
+        for (j, a) in columns().enumerate() {
+            self.gradient[j] += dot(a, stack.residual);
+            let (before, from) = self.hessian.split_at_mut(j * n);
+            for (i, b) in columns().take(j).enumerate() {
+                let product = dot(a, b);
+                from[i] += product;
+                before[i * n + j] += product;
+            }
+            from[j] += dot(a, a);
+        }
+    }
+
+    /// Nothing is bounded.
+    pub(crate) fn free(&mut self) {
+        self.lo.fill(f64::NEG_INFINITY);
+        self.hi.fill(f64::INFINITY);
+    }
+
+    /// The step's intervals as seen from an iterate that is already `dq` away from q⁻.
+    pub(crate) fn bound(&mut self, bounds: &Bounds<'_>, dq: &[f64]) {
+        for (i, dq) in dq.iter().enumerate() {
+            self.lo[i] = bounds.lo[i] - dq;
+            self.hi[i] = bounds.hi[i] - dq;
+        }
+    }
+
+    /// Solves with the hard rows `A d = −r` (`rows` of them); the answer is in `self.solution`.
+    pub(crate) fn solve(&mut self, hard: Stack<'_>, rows: usize, eval: &mut Evaluator) -> Outcome {
+        let n = self.gradient.len();
+        for (b, r) in self.right.iter_mut().zip(&hard.residual[..rows]) {
+            *b = -r;
+        }
+        let qp = Qp {
+            h: MatRef::new(&self.hessian, n, n),
+            g: &self.gradient,
+            a: MatRef { data: hard.matrix, rows, cols: n, ld: hard.ld },
+            b: &self.right[..rows],
+            lo: &self.lo,
+            hi: &self.hi,
+        };
+        let outcome = self.solver.solve(&qp, &mut self.solution);
+        eval.meter.minors(self.solution.minors);
+        outcome
+    }
+}
+
+#[inline(always)]
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // Columns are padded to a multiple of four: four partial sums keep the vector units busy.
+    let mut sums = [0.0; 4];
+    for (a, b) in a.chunks_exact(4).zip(b.chunks_exact(4)) {
+        for k in 0..4 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
+}
+
+/// Writes q = q⁻ ⊕ dq (dq clamped into the intervals of bounded joints) and v = dq/Δt.
+pub(crate) fn finish(problem: &Problem, step: &ControlStep<'_>, dq: &mut [f64], out: &mut Solution) {
+    for ((d, lo), hi) in dq.iter_mut().zip(step.bounds.lo).zip(step.bounds.hi) {
+        *d = d.max(*lo).min(*hi);
+    }
+    finish_unbounded(problem, step, dq, out);
+}
+
+/// The same without the intervals, for methods that know no boundary.
+pub(crate) fn finish_unbounded(problem: &Problem, step: &ControlStep<'_>, dq: &[f64], out: &mut Solution) {
+    ik_core::configuration::integrate_into(problem.robot(), step.q_prev, dq, &mut out.q);
+    for (v, d) in out.v.iter_mut().zip(dq) {
+        *v = d / step.dt_s;
+    }
+}
+
+/// Standing still: q⁻, zero velocity.
+pub(crate) fn stay(step: &ControlStep<'_>, out: &mut Solution) {
+    out.q.copy_from_slice(step.q_prev);
+    out.v.fill(0.0);
+}
+
+/// How a step ends whose last quadratic program ended as `outcome`: `otherwise` if that was well. Without any usable
+/// answer the robot stays where it was.
+pub(crate) fn conclude(
+    outcome: Outcome,
+    otherwise: Termination,
+    step: &ControlStep<'_>,
+    out: &mut Solution,
+) -> Termination {
+    match outcome {
+        Outcome::Solved => otherwise,
+        Outcome::Relaxed { residual } => Termination::HardRowsRelaxed { residual },
+        Outcome::Failed(status) => {
+            stay(step, out);
+            Termination::Numerical(match status {
+                QpStatus::Infeasible => "the interval of a joint is empty",
+                _ => "the quadratic program could not be solved",
+            })
+        }
+    }
+}
