@@ -1,3 +1,7 @@
-//! The `ik-bench` command.
+//! The `ik-bench` command; everything it does is in the library.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    benchmarks::cli::main()
+}

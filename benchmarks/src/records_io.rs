@@ -42,7 +42,9 @@ pub enum RecordError {
         reason: String,
     },
     /// A row has another layout than this program knows.
-    #[error("{path}, line {line}, field schema: found {found:?}, this program reads {SCHEMA:?}; use another --out folder")]
+    #[error(
+        "{path}, line {line}, field schema: found {found:?}, this program reads {SCHEMA:?}; use another --out folder"
+    )]
     Schema {
         /// File.
         path: PathBuf,
@@ -52,7 +54,9 @@ pub enum RecordError {
         found: String,
     },
     /// A row would not come back as it was: JSON has no number for NaN and infinity.
-    #[error("{path}: row {method} on {suite}/{scenario} holds a number that is not finite; null fields: {fields}")]
+    #[error(
+        "{path}: row {method} on {suite}/{scenario} holds a number that is not finite; null fields: {fields}"
+    )]
     NotFinite {
         /// File it was meant for.
         path: PathBuf,
@@ -80,7 +84,9 @@ pub enum RecordError {
         expected: String,
     },
     /// A text file lacks the markers between which a generated text goes.
-    #[error("{path}: {reason}; it must contain {begin:?} once and {end:?} once after it, each on a line of its own")]
+    #[error(
+        "{path}: {reason}; it must contain {begin:?} once and {end:?} once after it, each on a line of its own"
+    )]
     Markers {
         /// File.
         path: PathBuf,
@@ -98,9 +104,15 @@ pub enum RecordError {
 /// # Errors
 /// [`RecordError::Io`].
 pub fn write_atomically(path: &Path, content: &str) -> Result<(), RecordError> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     fs::create_dir_all(folder).map_err(|e| io_error(folder, "create folder", e))?;
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = path
+        .file_name()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default();
     let temporary = folder.join(format!(".{name}.{}.tmp", std::process::id()));
     let written = fs::write(&temporary, content)
         .map_err(|e| io_error(&temporary, "write", e))
@@ -117,7 +129,11 @@ pub(crate) fn read_text(path: &Path) -> Result<String, RecordError> {
 }
 
 fn io_error(path: &Path, action: &'static str, source: std::io::Error) -> RecordError {
-    RecordError::Io { path: path.to_path_buf(), action, source }
+    RecordError::Io {
+        path: path.to_path_buf(),
+        action,
+        source,
+    }
 }
 
 /// What a file of rows holds.
@@ -142,7 +158,11 @@ pub fn read_rows(path: &Path) -> Result<RowFile, RecordError> {
         match parse_row(path, index + 1, line) {
             Ok(row) => file.rows.push(row),
             Err(RecordError::BadRow { reason, .. }) if is_unfinished => {
-                file.torn = Some(format!("{}, line {}: torn, skipped: {reason}", path.display(), index + 1));
+                file.torn = Some(format!(
+                    "{}, line {}: torn, skipped: {reason}",
+                    path.display(),
+                    index + 1
+                ));
             }
             Err(error) => return Err(error),
         }
@@ -151,10 +171,22 @@ pub fn read_rows(path: &Path) -> Result<RowFile, RecordError> {
 }
 
 fn parse_row(path: &Path, line: usize, text: &str) -> Result<Row, RecordError> {
-    let bad = |e: serde_json::Error| RecordError::BadRow { path: path.to_path_buf(), line, reason: e.to_string() };
+    let bad = |e: serde_json::Error| RecordError::BadRow {
+        path: path.to_path_buf(),
+        line,
+        reason: e.to_string(),
+    };
     let value: serde_json::Value = serde_json::from_str(text).map_err(bad)?;
-    if let Some(found) = value.get("schema").and_then(|s| s.as_str()).filter(|s| *s != SCHEMA) {
-        return Err(RecordError::Schema { path: path.to_path_buf(), line, found: found.to_owned() });
+    if let Some(found) = value
+        .get("schema")
+        .and_then(|s| s.as_str())
+        .filter(|s| *s != SCHEMA)
+    {
+        return Err(RecordError::Schema {
+            path: path.to_path_buf(),
+            line,
+            found: found.to_owned(),
+        });
     }
     // From the text again, not from the value: only then does the message carry the column.
     serde_json::from_str(text).map_err(bad)
@@ -197,7 +229,15 @@ impl RowKey {
 
     /// Key of a row.
     pub fn of(row: &Row) -> Self {
-        Self::new(&row.method, &row.parameters, &row.suite, &row.scenario, row.dt_s, row.seed, &row.revision)
+        Self::new(
+            &row.method,
+            &row.parameters,
+            &row.suite,
+            &row.scenario,
+            row.dt_s,
+            row.seed,
+            &row.revision,
+        )
     }
 }
 
@@ -218,8 +258,18 @@ impl RowStore {
     /// As [`read_rows`].
     pub fn open(dir: &Path) -> Result<Self, RecordError> {
         let path = dir.join(ROWS_FILE);
-        let file = if path.exists() { read_rows(&path)? } else { RowFile::default() };
-        let mut store = Self { path, rows: Vec::new(), keys: BTreeSet::new(), text: String::new(), torn: file.torn };
+        let file = if path.exists() {
+            read_rows(&path)?
+        } else {
+            RowFile::default()
+        };
+        let mut store = Self {
+            path,
+            rows: Vec::new(),
+            keys: BTreeSet::new(),
+            text: String::new(),
+            torn: file.torn,
+        };
         for row in file.rows {
             store.text.push_str(&to_line(&store.path, &row)?);
             store.remember(row);
@@ -282,13 +332,22 @@ fn to_line(path: &Path, row: &Row) -> Result<String, RecordError> {
 
 fn null_metrics(line: &str) -> String {
     let value: serde_json::Value = serde_json::from_str(line).unwrap_or_default();
-    let Some(metrics) = value["metrics"].as_object() else { return "dt_s or a parameter".to_owned() };
-    let names: Vec<&str> = metrics.iter().filter(|(_, v)| holds_null(v)).map(|(k, _)| k.as_str()).collect();
+    let Some(metrics) = value["metrics"].as_object() else {
+        return "dt_s or a parameter".to_owned();
+    };
+    let names: Vec<&str> = metrics
+        .iter()
+        .filter(|(_, v)| holds_null(v))
+        .map(|(k, _)| k.as_str())
+        .collect();
     names.join(", ")
 }
 
 fn holds_null(value: &serde_json::Value) -> bool {
-    value.is_null() || value.as_object().is_some_and(|o| o.values().any(serde_json::Value::is_null))
+    value.is_null()
+        || value
+            .as_object()
+            .is_some_and(|o| o.values().any(serde_json::Value::is_null))
 }
 
 /// Writes a trace as CSV: a header of column names, then one line per sample. Numbers are the shortest decimals that read
@@ -343,7 +402,9 @@ pub fn read_trace(path: &Path) -> Result<Trace, RecordError> {
 fn parse_values(path: &Path, line: usize, text: &str, columns: &[String]) -> Result<Vec<f64>, RecordError> {
     check_length(path, line, text.split(',').count(), columns.len())?;
     let parse = |(field, column): (&str, &String)| {
-        field.parse::<f64>().map_err(|_| bad_trace(path, line, column, field, "a number".to_owned()))
+        field
+            .parse::<f64>()
+            .map_err(|_| bad_trace(path, line, column, field, "a number".to_owned()))
     };
     text.split(',').zip(columns).map(parse).collect()
 }
@@ -353,7 +414,13 @@ fn check_length(path: &Path, line: usize, found: usize, expected: usize) -> Resu
         return Ok(());
     }
     let place = found.min(expected) + 1;
-    Err(bad_trace(path, line, &place.to_string(), &format!("{found} values"), format!("{expected}, one per column")))
+    Err(bad_trace(
+        path,
+        line,
+        &place.to_string(),
+        &format!("{found} values"),
+        format!("{expected}, one per column"),
+    ))
 }
 
 fn check_header(path: &Path, columns: &[String]) -> Result<(), RecordError> {
@@ -370,7 +437,13 @@ fn check_header(path: &Path, columns: &[String]) -> Result<(), RecordError> {
 
 fn bad_trace(path: &Path, line: usize, column: &str, found: &str, expected: String) -> RecordError {
     let (column, found) = (column.to_owned(), found.to_owned());
-    RecordError::BadTrace { path: path.to_path_buf(), line, column, found, expected }
+    RecordError::BadTrace {
+        path: path.to_path_buf(),
+        line,
+        column,
+        found,
+        expected,
+    }
 }
 
 /// Replaces what stands between two marker lines of a text file, atomically; the markers stay.
@@ -387,7 +460,12 @@ pub fn replace_between(path: &Path, begin: &str, end: &str, content: &str) -> Re
     };
     let lines: Vec<&str> = text.lines().collect();
     let places = |marker: &str| -> Vec<usize> {
-        lines.iter().enumerate().filter(|(_, l)| l.trim() == marker).map(|(i, _)| i).collect()
+        lines
+            .iter()
+            .enumerate()
+            .filter(|(_, l)| l.trim() == marker)
+            .map(|(i, _)| i)
+            .collect()
     };
     let (first, last) = match (places(begin).as_slice(), places(end).as_slice()) {
         ([], _) | (_, []) => return Err(fail("a marker is missing")),

@@ -55,7 +55,7 @@ pub fn line_fit(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     let spread: f64 = points.iter().map(|p| (p.0 - mean_x).powi(2)).sum();
     let product: f64 = points.iter().map(|p| (p.0 - mean_x) * (p.1 - mean_y)).sum();
     let slope = product / spread;
-    slope.is_finite().then(|| (mean_y - slope * mean_x, slope))
+    slope.is_finite().then_some((mean_y - slope * mean_x, slope))
 }
 
 /// Distribution of the times of the steps of one run (µs).
@@ -102,7 +102,10 @@ mod tests {
         let expected = [(0.0, 1.0), (25.0, 2.0), (50.0, 3.0), (95.0, 8.8), (100.0, 10.0)];
         for (percent, value) in expected {
             let found = percentile(&mut values, percent).unwrap();
-            assert!((found - value).abs() < 1e-12, "{percent}: {found} instead of {value}");
+            assert!(
+                (found - value).abs() < 1e-12,
+                "{percent}: {found} instead of {value}"
+            );
         }
         assert_eq!(median(&mut [4.0, 1.0]), Some(2.5));
         assert_eq!(median(&mut []), None);
@@ -120,7 +123,10 @@ mod tests {
     #[test]
     fn median_filter_removes_a_spike_and_keeps_an_edge() {
         let values = [1.0, 1.0, 90.0, 1.0, 1.0, 5.0, 5.0, 5.0, 5.0];
-        assert_eq!(median_filtered(&values, 3), [1.0, 1.0, 1.0, 1.0, 1.0, 5.0, 5.0, 5.0, 5.0]);
+        assert_eq!(
+            median_filtered(&values, 3),
+            [1.0, 1.0, 1.0, 1.0, 1.0, 5.0, 5.0, 5.0, 5.0]
+        );
         assert_eq!(median_filtered(&[7.0], 11), [7.0]);
         assert!(median_filtered(&[], 11).is_empty());
     }
@@ -138,7 +144,14 @@ mod tests {
     fn step_times_of_one_hundred_and_one_steps() {
         let mut times: Vec<f64> = (0..=100).rev().map(f64::from).collect();
         let found = StepTimes::from_us(&mut times).unwrap();
-        let expected = StepTimes { min: 0.0, median: 50.0, p95: 95.0, p99: 99.0, max: 100.0, mean: 50.0 };
+        let expected = StepTimes {
+            min: 0.0,
+            median: 50.0,
+            p95: 95.0,
+            p99: 99.0,
+            max: 100.0,
+            mean: 50.0,
+        };
         assert_eq!(found, expected);
         assert_eq!(StepTimes::from_us(&mut []), None);
     }

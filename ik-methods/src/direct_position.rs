@@ -224,9 +224,9 @@ impl Model for CombinedRows {
         regulated(&lin.hard, gamma, dq, dt_s, &mut out.hard);
     }
 
-    fn curvature_weight(&self, error: f64, rate_dt: f64) -> f64 {
+    fn curvature_weight(&self, residual: &[f64], i: usize, _task_ld: usize) -> f64 {
         // At dq = 0 the Hessian of J(q) dq is twice that of f.
-        (error - self.gamma * rate_dt) * (1.0 + 2.0 * self.gamma)
+        residual[i] * (1.0 + 2.0 * self.gamma)
     }
 }
 

@@ -44,8 +44,9 @@ pub(crate) trait Model: Send + std::fmt::Debug {
     /// Writes r, c and their exact Jacobians at an iterate `dq` from q⁻. The second-order terms of `lin` are filled.
     fn assemble(&self, lin: &Linearisation, dq: &[f64], dt_s: f64, out: &mut Residuals);
 
-    /// Weight of the Hessian of soft row i in the Hessian of ½‖r‖² at dq = 0, for error e_i and rate ẋ_i Δt.
-    fn curvature_weight(&self, error: f64, rate_dt: f64) -> f64;
+    /// Weight of the Hessian of soft task row `i` in the Hessian of ½‖r‖² at dq = 0, where the rows have the value
+    /// `residual` (`task_ld` is the padded number of task rows).
+    fn curvature_weight(&self, residual: &[f64], i: usize, task_ld: usize) -> f64;
 }
 
 /// r, c and their Jacobians; column-major, padded.
@@ -76,14 +77,19 @@ impl Block {
         Stack { matrix: &self.matrix, ld: self.ld, residual: &self.residual }
     }
 
-    /// `‖residual + A d‖₁` for d = 0 and for `d`.
-    fn absolute_sums(&mut self, d: &[f64]) -> (f64, f64) {
-        let now = self.residual[..self.rows].iter().map(|r| r.abs()).sum();
+    /// Writes `residual + A d` into `motion`.
+    pub(crate) fn predict(&mut self, d: &[f64]) {
         self.motion.copy_from_slice(&self.residual);
         for (column, d) in self.matrix.chunks_exact(self.ld).zip(d) {
             self.motion.iter_mut().zip(column).for_each(|(m, c)| *m += c * d);
         }
-        (now, self.motion[..self.rows].iter().map(|r| r.abs()).sum())
+    }
+
+    /// `‖residual + A d‖₁` for d = 0 and for `d`.
+    fn absolute_sums(&mut self, d: &[f64]) -> (f64, f64) {
+        self.predict(d);
+        let sum = |v: &[f64]| v[..self.rows].iter().map(|r| r.abs()).sum();
+        (sum(&self.residual), sum(&self.motion))
     }
 }
 

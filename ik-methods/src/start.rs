@@ -184,6 +184,8 @@ impl Scratch {
         let m = self.residuals.hard.rows;
         self.multipliers[..m].copy_from_slice(&self.qp.solution.y[..m]);
         self.bound_multipliers.copy_from_slice(&self.qp.solution.z);
+        // Multipliers belong to the residuals that the program leaves, not to those it starts from.
+        self.residuals.soft.predict(&self.qp.solution.x);
     }
 
     /// Change of the Lagrangian, to second order, when the chosen candidates move and the others stay; the displacement is
@@ -219,7 +221,7 @@ impl Scratch {
         for (v, p) in p.iter().enumerate() {
             let column = &soft.second[v * soft.ld()..][..soft.rows()];
             for (i, h) in column.iter().enumerate() {
-                bending += p * h * model.curvature_weight(soft.error[i], soft.rate[i] * step.dt_s);
+                bending += p * h * model.curvature_weight(&self.residuals.soft.motion, i, soft.ld());
             }
             let column = &hard.second[v * hard.ld()..][..hard.rows()];
             bending -= p * dot(column, &self.multipliers);

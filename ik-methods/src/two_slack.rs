@@ -154,8 +154,8 @@ impl Model for SeparateRows {
         hard.matrix.copy_from_slice(&lin.hard.jacobian);
     }
 
-    fn curvature_weight(&self, error: f64, rate_dt: f64) -> f64 {
+    fn curvature_weight(&self, residual: &[f64], i: usize, task_ld: usize) -> f64 {
         // At dq = 0 the Hessian of J(q) dq is twice that of f.
-        error - 2.0 * self.gamma * rate_dt
+        residual[i] + 2.0 * self.gamma.sqrt() * residual[task_ld + i]
     }
 }

@@ -31,7 +31,12 @@ pub(super) struct Axis {
 
 impl Axis {
     pub(super) fn new(label: &str, scale: Scale) -> Self {
-        Self { label: label.to_owned(), scale, range: None, names: Vec::new() }
+        Self {
+            label: label.to_owned(),
+            scale,
+            range: None,
+            names: Vec::new(),
+        }
     }
 
     pub(super) fn linear(label: &str) -> Self {
@@ -65,7 +70,13 @@ impl Axis {
             Scale::Linear => linear_ticks(low, high, max_ticks),
             Scale::Log => log_ticks(low, high, max_ticks),
         };
-        FittedAxis { scale: self.scale, low, high, ticks, cut_below: cut.then_some(low) }
+        FittedAxis {
+            scale: self.scale,
+            low,
+            high,
+            ticks,
+            cut_below: cut.then_some(low),
+        }
     }
 }
 
@@ -93,7 +104,9 @@ impl FittedAxis {
 
 fn linear_range(curves: &[Vec<f64>]) -> (f64, f64) {
     let finite = curves.iter().flatten().filter(|v| v.is_finite());
-    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+        (l.min(*v), h.max(*v))
+    });
     if low <= high { (low, high) } else { (0.0, 1.0) }
 }
 
@@ -105,17 +118,32 @@ fn padded((low, high): (f64, f64)) -> (f64, f64) {
 
 fn log_range(curves: &[Vec<f64>]) -> (f64, f64) {
     let positive = |curve: &Vec<f64>| -> Vec<f64> {
-        curve.iter().copied().filter(|v| v.is_finite() && *v > LOG_FLOOR).collect()
+        curve
+            .iter()
+            .copied()
+            .filter(|v| v.is_finite() && *v > LOG_FLOOR)
+            .collect()
     };
-    let lows = curves.iter().filter_map(|c| percentile(&mut positive(c), LOG_LOW_PERCENT));
+    let lows = curves
+        .iter()
+        .filter_map(|c| percentile(&mut positive(c), LOG_LOW_PERCENT));
     let low = lows.fold(f64::INFINITY, f64::min);
-    let high = curves.iter().flatten().copied().filter(|v| v.is_finite()).fold(LOG_FLOOR, f64::max);
+    let high = curves
+        .iter()
+        .flatten()
+        .copied()
+        .filter(|v| v.is_finite())
+        .fold(LOG_FLOOR, f64::max);
     if !low.is_finite() {
         // Nothing positive: one decade, so that zeros have an edge to lie on.
         return (LOG_FLOOR, 10.0 * LOG_FLOOR);
     }
     let (low, high) = (round_125(low, f64::floor), round_125(high * 1.05, f64::ceil));
-    if high > low { (low, high) } else { (low / 2.0, low * 2.0) }
+    if high > low {
+        (low, high)
+    } else {
+        (low / 2.0, low * 2.0)
+    }
 }
 
 /// Nearest of 1, 2, 5 times a power of ten, downwards (`f64::floor`) or upwards (`f64::ceil`).
@@ -124,9 +152,16 @@ fn round_125(value: f64, direction: fn(f64) -> f64) -> f64 {
     let steps = [1.0, 2.0, 5.0, 10.0].map(|s| s * decade);
     // `ceil` moves 0.5 up, `floor` moves it down.
     if direction(0.5) > 0.5 {
-        steps.into_iter().find(|s| *s >= value * (1.0 - 1e-9)).unwrap_or(steps[3])
+        steps
+            .into_iter()
+            .find(|s| *s >= value * (1.0 - 1e-9))
+            .unwrap_or(steps[3])
     } else {
-        steps.into_iter().rev().find(|s| *s <= value * (1.0 + 1e-9)).unwrap_or(steps[0])
+        steps
+            .into_iter()
+            .rev()
+            .find(|s| *s <= value * (1.0 + 1e-9))
+            .unwrap_or(steps[0])
     }
 }
 
@@ -144,7 +179,10 @@ fn linear_ticks(low: f64, high: f64, max_ticks: usize) -> Vec<(f64, String)> {
 }
 
 fn log_ticks(low: f64, high: f64, max_ticks: usize) -> Vec<(f64, String)> {
-    let (first, last) = ((low.log10() - 1e-9).floor() as i32, (high.log10() + 1e-9).ceil() as i32);
+    let (first, last) = (
+        (low.log10() - 1e-9).floor() as i32,
+        (high.log10() + 1e-9).ceil() as i32,
+    );
     let inside = |v: f64| v >= low * (1.0 - 1e-9) && v <= high * (1.0 + 1e-9);
     let fine: Vec<(f64, String)> = (first..=last)
         .flat_map(|e| [1, 2, 5].map(|m| (f64::from(m) * 10_f64.powi(e), power_label(m, e))))
@@ -203,7 +241,12 @@ mod tests {
 
     #[test]
     fn a_constant_or_empty_curve_still_has_an_axis() {
-        for curves in [vec![vec![2.0]], vec![vec![0.0, 0.0]], vec![], vec![vec![f64::INFINITY]]] {
+        for curves in [
+            vec![vec![2.0]],
+            vec![vec![0.0, 0.0]],
+            vec![],
+            vec![vec![f64::INFINITY]],
+        ] {
             for axis in [Axis::linear("x"), Axis::log("x")] {
                 let fitted = axis.fit(&curves, 5);
                 assert!(fitted.low < fitted.high, "{curves:?} {fitted:?}");
@@ -215,7 +258,10 @@ mod tests {
     #[test]
     fn zeros_lie_on_the_lower_edge_of_a_log_axis_and_are_reported() {
         let axis = Axis::log("error").fit(&[vec![0.0, 1e-5, 1e-3, 2e-3]], 6);
-        assert!(axis.cut_below.is_some_and(|c| c <= 1.1e-5 && c > 1e-6), "{axis:?}");
+        assert!(
+            axis.cut_below.is_some_and(|c| c <= 1.1e-5 && c > 1e-6),
+            "{axis:?}"
+        );
         assert!(axis.place(0.0).abs() < 1e-12);
         assert!(Axis::log("error").fit(&[vec![1e-5, 1e-3]], 6).cut_below.is_none());
     }

@@ -19,10 +19,15 @@ const LOST: RGBColor = RGBColor(247, 223, 204);
 
 /// Figure 3, family.
 pub(super) fn survival(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
-    let runs: Vec<Labelled<'_>> =
-        studio.runs_of_suite(SUITE).into_iter().filter(|l| l.row.scenario != APART).collect();
+    let runs: Vec<Labelled<'_>> = studio
+        .runs_of_suite(SUITE)
+        .into_iter()
+        .filter(|l| l.row.scenario != APART)
+        .collect();
     let Some(first) = runs.first() else {
-        return Err(Obstacle::NoData(format!("no run on a family scenario of {SUITE}")));
+        return Err(Obstacle::NoData(format!(
+            "no run on a family scenario of {SUITE}"
+        )));
     };
     let dt = milliseconds(first.row.dt_s);
     let matrix = Matrix::new(&runs);
@@ -51,7 +56,11 @@ impl<'a> Matrix<'a> {
             }
         }
         methods.sort_by_key(|(label, n)| (label.clone(), std::cmp::Reverse(*n)));
-        Self { runs, scenarios, methods }
+        Self {
+            runs,
+            scenarios,
+            methods,
+        }
     }
 
     fn cell_width(&self) -> f64 {
@@ -60,7 +69,8 @@ impl<'a> Matrix<'a> {
 
     fn paint(&self, sheet: &Sheet<'_>, dt_ms: f64) -> Drawing {
         let look = |size, anchor, colour| Type { size, anchor, colour };
-        let title = format!("Fig. 3, family  Asymmetric squats: {SUITE}, all but scenario {APART}, Δt = {dt_ms} ms");
+        let title =
+            format!("Fig. 3, family  Asymmetric squats: {SUITE}, all but scenario {APART}, Δt = {dt_ms} ms");
         sheet.text(&title, (12.0, 22.0), look(15.0, Anchor::Left, BLACK))?;
         let explanation = "Largest CoM error (mm).  Tick: survived.  Cross: lost.  – : declined or not run.";
         sheet.text(explanation, (12.0, 44.0), look(12.0, Anchor::Left, GREY))?;
@@ -68,7 +78,11 @@ impl<'a> Matrix<'a> {
             let x = LEFT + (column as f64 + 0.5) * self.cell_width();
             let (name, variant) = label.split_once([' ', '-']).unwrap_or((label, ""));
             let budget = n.map_or(String::new(), |n| format!("n={n}"));
-            let second = [variant, &budget].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(" ");
+            let second = [variant, &budget]
+                .into_iter()
+                .filter(|s| !s.is_empty())
+                .collect::<Vec<_>>()
+                .join(" ");
             sheet.text(name, (x, TOP - 26.0), look(11.0, Anchor::Centre, BLACK))?;
             sheet.text(&second, (x, TOP - 11.0), look(10.0, Anchor::Centre, BLACK))?;
         }
@@ -83,8 +97,10 @@ impl<'a> Matrix<'a> {
     fn cells(&self, sheet: &Sheet<'_>) -> Drawing {
         for (row, scenario) in self.scenarios.iter().enumerate() {
             for (column, method) in self.methods.iter().enumerate() {
-                let corner =
-                    (LEFT + column as f64 * self.cell_width(), TOP + row as f64 * CELL_HEIGHT);
+                let corner = (
+                    LEFT + column as f64 * self.cell_width(),
+                    TOP + row as f64 * CELL_HEIGHT,
+                );
                 self.cell(sheet, corner, self.find(scenario, method))?;
             }
         }
@@ -92,7 +108,9 @@ impl<'a> Matrix<'a> {
     }
 
     fn find(&self, scenario: &str, method: &(String, Option<u64>)) -> Option<&Labelled<'_>> {
-        self.runs.iter().find(|r| r.row.scenario == scenario && r.label == method.0 && r.n == method.1)
+        self.runs
+            .iter()
+            .find(|r| r.row.scenario == scenario && r.label == method.0 && r.n == method.1)
     }
 
     fn cell(&self, sheet: &Sheet<'_>, (x, y): Point, run: Option<&Labelled<'_>>) -> Drawing {
@@ -102,24 +120,41 @@ impl<'a> Matrix<'a> {
         sheet.fill((x, y), opposite, tint)?;
         sheet.frame((x, y), opposite, WHITE)?;
         let text_at = (x + self.cell_width() / 2.0 + 8.0, y + CELL_HEIGHT / 2.0);
-        let look = Type { size: 11.0, anchor: Anchor::Centre, colour: BLACK };
-        let Some(quality) = quality else { return sheet.text("–", text_at, look) };
+        let look = Type {
+            size: 11.0,
+            anchor: Anchor::Centre,
+            colour: BLACK,
+        };
+        let Some(quality) = quality else {
+            return sheet.text("–", text_at, look);
+        };
         symbol(sheet, (x + 13.0, y + CELL_HEIGHT / 2.0), quality.survived)?;
-        let error = quality.com_error_max_m.map_or("–".to_owned(), |e| millimetres(e * 1e3));
+        let error = quality
+            .com_error_max_m
+            .map_or("–".to_owned(), |e| millimetres(e * 1e3));
         sheet.text(&error, text_at, look)
     }
 
     /// Survivors per method below the matrix.
     fn sums(&self, sheet: &Sheet<'_>) -> Drawing {
         let y = TOP + CELL_HEIGHT * self.scenarios.len() as f64 + 16.0;
-        let look = |anchor| Type { size: 12.0, anchor, colour: BLACK };
+        let look = |anchor| Type {
+            size: 12.0,
+            anchor,
+            colour: BLACK,
+        };
         sheet.text("survived", (LEFT - 8.0, y), look(Anchor::Right))?;
         for (column, (label, n)) in self.methods.iter().enumerate() {
             let of_method = self.runs.iter().filter(|r| r.label == *label && r.n == *n);
-            let metrics: Vec<bool> =
-                of_method.map(|r| r.row.metrics.as_ref().is_some_and(|m| m.quality.survived)).collect();
+            let metrics: Vec<bool> = of_method
+                .map(|r| r.row.metrics.as_ref().is_some_and(|m| m.quality.survived))
+                .collect();
             let sum = format!("{}/{}", metrics.iter().filter(|s| **s).count(), metrics.len());
-            sheet.text(&sum, (LEFT + (column as f64 + 0.5) * self.cell_width(), y), look(Anchor::Centre))?;
+            sheet.text(
+                &sum,
+                (LEFT + (column as f64 + 0.5) * self.cell_width(), y),
+                look(Anchor::Centre),
+            )?;
         }
         Ok(())
     }
@@ -135,9 +170,16 @@ fn millimetres(value: f64) -> String {
 
 /// A tick or a cross, drawn as lines: not every font has the signs.
 fn symbol(sheet: &Sheet<'_>, (x, y): Point, survived: bool) -> Drawing {
-    let stroke = |colour| Stroke { colour, width: 2.0, dash: Dash::Solid };
+    let stroke = |colour| Stroke {
+        colour,
+        width: 2.0,
+        dash: Dash::Solid,
+    };
     if survived {
-        return sheet.line(&[(x - 5.0, y), (x - 1.5, y + 4.0), (x + 5.0, y - 5.0)], stroke(GREEN));
+        return sheet.line(
+            &[(x - 5.0, y), (x - 1.5, y + 4.0), (x + 5.0, y - 5.0)],
+            stroke(GREEN),
+        );
     }
     sheet.line(&[(x - 4.0, y - 4.0), (x + 4.0, y + 4.0)], stroke(VERMILLION))?;
     sheet.line(&[(x - 4.0, y + 4.0), (x + 4.0, y - 4.0)], stroke(VERMILLION))

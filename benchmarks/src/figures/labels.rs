@@ -84,7 +84,11 @@ fn name<'a>(row: &'a Row, rows: &[&Row]) -> Labelled<'a> {
     if rivals.iter().any(|r| r.dt_s.to_bits() != row.dt_s.to_bits()) {
         label.push_str(&format!(" dt={}ms", row.dt_s * 1e3));
     }
-    Labelled { row, label, n: row.parameters.get("n").and_then(Value::as_u64) }
+    Labelled {
+        row,
+        label,
+        n: row.parameters.get("n").and_then(Value::as_u64),
+    }
 }
 
 fn plain(value: &Value) -> String {

@@ -59,6 +59,7 @@ pub struct DrawnLimits {
 
 impl DrawnLimits {
     /// Coman with the knee limited at its singularity, Table I of the paper, and our polygon.
+    #[allow(clippy::approx_constant, reason = "the limit in the robot's table, not a fraction of pi")]
     pub const COMAN: Self = Self {
         knee_rad: (0.0, 1.9199),
         hip_pitch_rad: (-1.9199, 0.7854),
@@ -87,7 +88,13 @@ pub fn draw_all(dir: &Path, limits: &DrawnLimits) -> Result<Drawn, FigureError> 
     let rows = read_rows(&dir.join(ROWS_FILE))?.rows;
     let runs = of_last_dt(labelled(&rows));
     let styles = Styles::assign(runs.iter().map(|r| r.label.as_str()));
-    let mut studio = Studio { dir, runs, styles, limits: *limits, notes: Vec::new() };
+    let mut studio = Studio {
+        dir,
+        runs,
+        styles,
+        limits: *limits,
+        notes: Vec::new(),
+    };
     let mut files = Vec::new();
     for (name, paint) in FIGURES {
         let path = dir.join("figures").join(name);
@@ -101,18 +108,28 @@ pub fn draw_all(dir: &Path, limits: &DrawnLimits) -> Result<Drawn, FigureError> 
                 remove_stale(&path)?;
             }
             Err(Obstacle::Record(error)) => return Err(error.into()),
-            Err(Obstacle::Draw(reason)) => return Err(FigureError::Draw { figure: name.to_owned(), reason }),
+            Err(Obstacle::Draw(reason)) => {
+                return Err(FigureError::Draw {
+                    figure: name.to_owned(),
+                    reason,
+                });
+            }
         }
     }
     studio.notes.dedup();
-    Ok(Drawn { files, notes: studio.notes })
+    Ok(Drawn {
+        files,
+        notes: studio.notes,
+    })
 }
 
 fn remove_stale(path: &Path) -> Result<(), RecordError> {
     match std::fs::remove_file(path) {
-        Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
-            Err(RecordError::Io { path: path.to_path_buf(), action: "remove", source })
-        }
+        Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(RecordError::Io {
+            path: path.to_path_buf(),
+            action: "remove",
+            source,
+        }),
         _ => Ok(()),
     }
 }
@@ -178,7 +195,11 @@ impl<'a> Studio<'a> {
 
     /// Runs of a suite.
     fn runs_of_suite(&self, suite: &str) -> Vec<Labelled<'a>> {
-        self.runs.iter().filter(|l| l.row.suite == suite).cloned().collect()
+        self.runs
+            .iter()
+            .filter(|l| l.row.suite == suite)
+            .cloned()
+            .collect()
     }
 
     /// Those of the runs that have a trace with at least one sample. The others are noted.
@@ -195,7 +216,9 @@ impl<'a> Studio<'a> {
     }
 
     fn trace(&self, row: &Row) -> Result<Option<Trace>, RecordError> {
-        let Some(relative) = &row.trace else { return Ok(None) };
+        let Some(relative) = &row.trace else {
+            return Ok(None);
+        };
         let path = self.dir.join(relative);
         if !path.exists() {
             return Ok(None);
@@ -204,33 +227,67 @@ impl<'a> Studio<'a> {
     }
 
     fn miss(&mut self, run: &Labelled<'_>, reason: &str) {
-        self.notes.push(format!("{} on {}/{}: {reason}", run.full(), run.row.suite, run.row.scenario));
+        self.notes.push(format!(
+            "{} on {}/{}: {reason}",
+            run.full(),
+            run.row.suite,
+            run.row.scenario
+        ));
     }
 }
 
 /// Keeps, per suite, the runs with the Δt of the last row.
 fn of_last_dt(runs: Vec<Labelled<'_>>) -> Vec<Labelled<'_>> {
     let last_dt = |suite: &str| {
-        runs.iter().rev().find(|l| l.row.suite == suite).map(|l| l.row.dt_s.to_bits())
+        runs.iter()
+            .rev()
+            .find(|l| l.row.suite == suite)
+            .map(|l| l.row.dt_s.to_bits())
     };
-    let keep: Vec<bool> = runs.iter().map(|l| last_dt(&l.row.suite) == Some(l.row.dt_s.to_bits())).collect();
-    runs.into_iter().zip(keep).filter(|(_, k)| *k).map(|(l, _)| l).collect()
+    let keep: Vec<bool> = runs
+        .iter()
+        .map(|l| last_dt(&l.row.suite) == Some(l.row.dt_s.to_bits()))
+        .collect();
+    runs.into_iter()
+        .zip(keep)
+        .filter(|(_, k)| *k)
+        .map(|(l, _)| l)
+        .collect()
 }
 
+/// Points of a curve: (time, value) or (abscissa, ordinate).
+type Points = Vec<(f64, f64)>;
+
 /// Points (t, value) of a column; none if the trace lacks it.
-fn over_time(trace: &Trace, column: &str) -> Option<Vec<(f64, f64)>> {
-    Some(trace.column("t")?.into_iter().zip(trace.column(column)?).collect())
+fn over_time(trace: &Trace, column: &str) -> Option<Points> {
+    Some(
+        trace
+            .column("t")?
+            .into_iter()
+            .zip(trace.column(column)?)
+            .collect(),
+    )
 }
 
 /// Points (t_k, (q_k − q_{k−1})/(t_k − t_{k−1})), k ≥ 1, of a column; none if the trace lacks it.
-fn rate_over_time(trace: &Trace, column: &str) -> Option<Vec<(f64, f64)>> {
+fn rate_over_time(trace: &Trace, column: &str) -> Option<Points> {
     let points = over_time(trace, column)?;
-    Some(points.windows(2).map(|w| (w[1].0, (w[1].1 - w[0].1) / (w[1].0 - w[0].0))).collect())
+    Some(
+        points
+            .windows(2)
+            .map(|w| (w[1].0, (w[1].1 - w[0].1) / (w[1].0 - w[0].0)))
+            .collect(),
+    )
 }
 
 /// Suite, scenario and Δt as they stand in a title.
 fn place_of(run: &Labelled<'_>) -> String {
-    format!("{}, scenario {}, Δt = {} ms", run.row.suite, run.row.scenario, milliseconds(run.row.dt_s))
+    format!(
+        "{}, scenario {}, Δt = {} ms",
+        run.row.suite,
+        run.row.scenario,
+        milliseconds(run.row.dt_s)
+    )
 }
 
 fn milliseconds(seconds: f64) -> f64 {
@@ -238,5 +295,7 @@ fn milliseconds(seconds: f64) -> f64 {
     (seconds * 1e9).round() / 1e6
 }
 
+#[cfg(test)]
+pub(crate) mod synthetic;
 #[cfg(test)]
 mod tests;

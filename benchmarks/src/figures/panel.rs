@@ -83,7 +83,15 @@ pub(super) struct Panel {
 impl Panel {
     pub(super) fn new(title: &str, x: Axis, y: Axis) -> Self {
         let (curves, dots, levels, remarks) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { title: title.to_owned(), x, y, curves, dots, levels, remarks }
+        Self {
+            title: title.to_owned(),
+            x,
+            y,
+            curves,
+            dots,
+            levels,
+            remarks,
+        }
     }
 
     fn is_empty(&self) -> bool {
@@ -136,7 +144,11 @@ impl Figure {
         let panels_height: f64 = self.rows.iter().map(|r| r.height).sum();
         let height = panels_top + panels_height + remarks.len() as f64 * 16.0 + MARGIN;
         draw(height.ceil(), |sheet| {
-            let title = Type { size: TITLE_SIZE, anchor: Anchor::Left, colour: BLACK };
+            let title = Type {
+                size: TITLE_SIZE,
+                anchor: Anchor::Left,
+                colour: BLACK,
+            };
             sheet.text(&self.title, (MARGIN, MARGIN + LINE_HEIGHT / 2.0), title)?;
             for ((x, y), (name, style)) in &legend {
                 sheet.key((*x, top + y + LEGEND_LINE / 2.0), name, *style)?;
@@ -146,7 +158,11 @@ impl Figure {
                 paint_row(sheet, row, y)?;
                 y += row.height;
             }
-            let look = Type { size: TICK_SIZE, anchor: Anchor::Left, colour: GREY };
+            let look = Type {
+                size: TICK_SIZE,
+                anchor: Anchor::Left,
+                colour: GREY,
+            };
             for (index, remark) in remarks.iter().enumerate() {
                 sheet.text(remark, (MARGIN, y + 8.0 + 16.0 * index as f64), look)?;
             }
@@ -173,7 +189,9 @@ impl Figure {
                 cuts.extend(fitted.cut_below.map(|c| (axis.label.clone(), rough(c))));
             }
         }
-        let cuts = cuts.into_iter().map(|(l, c)| format!("{l}: values below {c} are drawn at {c}."));
+        let cuts = cuts
+            .into_iter()
+            .map(|(l, c)| format!("{l}: values below {c} are drawn at {c}."));
         let remarks = self.remarks.iter().flat_map(|r| wrapped(r));
         remarks.chain(cuts).collect()
     }
@@ -233,9 +251,22 @@ struct Painter<'a, 'b> {
 impl<'a, 'b> Painter<'a, 'b> {
     fn new(sheet: &'a Sheet<'b>, panel: &'a Panel, corner: Point, size: Point) -> Self {
         let (x, y) = panel.fitted();
-        let ticks = y.ticks.iter().map(|t| text_width(&t.1, TICK_SIZE)).fold(0.0, f64::max);
-        let label = if panel.y.label.is_empty() { 0.0 } else { LABEL_SIZE + 8.0 };
-        let below = BOTTOM_TICKS + if panel.x.label.is_empty() { 4.0 } else { BOTTOM_LABEL };
+        let ticks = y
+            .ticks
+            .iter()
+            .map(|t| text_width(&t.1, TICK_SIZE))
+            .fold(0.0, f64::max);
+        let label = if panel.y.label.is_empty() {
+            0.0
+        } else {
+            LABEL_SIZE + 8.0
+        };
+        let below = BOTTOM_TICKS
+            + if panel.x.label.is_empty() {
+                4.0
+            } else {
+                BOTTOM_LABEL
+            };
         Self {
             sheet,
             panel,
@@ -253,7 +284,9 @@ impl<'a, 'b> Painter<'a, 'b> {
         self.labels()?;
         if self.panel.is_empty() {
             let middle = ((self.left + self.right) / 2.0, (self.top + self.bottom) / 2.0);
-            return self.sheet.text("no data", middle, self.look(Anchor::Centre, GREY));
+            return self
+                .sheet
+                .text("no data", middle, self.look(Anchor::Centre, GREY));
         }
         for level in &self.panel.levels {
             self.level(level)?;
@@ -262,16 +295,22 @@ impl<'a, 'b> Painter<'a, 'b> {
             self.curve(curve)?;
         }
         for dot in &self.panel.dots {
-            self.sheet.marker(self.at(dot.at), dot.radius, dot.colour, dot.marker)?;
+            self.sheet
+                .marker(self.at(dot.at), dot.radius, dot.colour, dot.marker)?;
         }
         for remark in &self.panel.remarks {
-            self.sheet.text(&remark.text, self.at(remark.at), self.look(Anchor::Left, BLACK))?;
+            self.sheet
+                .text(&remark.text, self.at(remark.at), self.look(Anchor::Left, BLACK))?;
         }
         Ok(())
     }
 
     fn look(&self, anchor: Anchor, colour: RGBColor) -> Type {
-        Type { size: TICK_SIZE, anchor, colour }
+        Type {
+            size: TICK_SIZE,
+            anchor,
+            colour,
+        }
     }
 
     fn at(&self, (x, y): Point) -> Point {
@@ -287,41 +326,82 @@ impl<'a, 'b> Painter<'a, 'b> {
     }
 
     fn grid(&self) -> Drawing {
-        let thin = Stroke { colour: PALE, width: 0.7, dash: Dash::Solid };
+        let thin = Stroke {
+            colour: PALE,
+            width: 0.7,
+            dash: Dash::Solid,
+        };
         for (value, text) in &self.x.ticks {
             let x = self.at_x(*value);
             self.sheet.line(&[(x, self.top), (x, self.bottom)], thin)?;
-            self.sheet.text(text, (x, self.bottom + 10.0), self.look(Anchor::Centre, BLACK))?;
+            self.sheet
+                .text(text, (x, self.bottom + 10.0), self.look(Anchor::Centre, BLACK))?;
         }
         for (value, text) in &self.y.ticks {
             let y = self.at_y(*value);
             self.sheet.line(&[(self.left, y), (self.right, y)], thin)?;
-            self.sheet.text(text, (self.left - 5.0, y), self.look(Anchor::Right, BLACK))?;
+            self.sheet
+                .text(text, (self.left - 5.0, y), self.look(Anchor::Right, BLACK))?;
         }
-        self.sheet.frame((self.left, self.top), (self.right, self.bottom), GREY)
+        self.sheet
+            .frame((self.left, self.top), (self.right, self.bottom), GREY)
     }
 
     fn labels(&self) -> Drawing {
-        let look = |anchor| Type { size: LABEL_SIZE, anchor, colour: BLACK };
+        let look = |anchor| Type {
+            size: LABEL_SIZE,
+            anchor,
+            colour: BLACK,
+        };
         let middle = (self.left + self.right) / 2.0;
-        let ticks = self.y.ticks.iter().map(|t| text_width(&t.1, TICK_SIZE)).fold(34.0, f64::max);
+        let ticks = self
+            .y
+            .ticks
+            .iter()
+            .map(|t| text_width(&t.1, TICK_SIZE))
+            .fold(34.0, f64::max);
         let beside = self.left - ticks - 8.0 - LABEL_SIZE / 2.0;
-        self.sheet.text(&self.panel.title, (middle, self.top - 11.0), look(Anchor::Centre))?;
-        self.sheet.text(&self.panel.x.label, (middle, self.bottom + 27.0), look(Anchor::Centre))?;
-        self.sheet.text(&self.panel.y.label, (beside, (self.top + self.bottom) / 2.0), look(Anchor::Upwards))
+        self.sheet
+            .text(&self.panel.title, (middle, self.top - 11.0), look(Anchor::Centre))?;
+        self.sheet.text(
+            &self.panel.x.label,
+            (middle, self.bottom + 27.0),
+            look(Anchor::Centre),
+        )?;
+        self.sheet.text(
+            &self.panel.y.label,
+            (beside, (self.top + self.bottom) / 2.0),
+            look(Anchor::Upwards),
+        )
     }
 
     fn level(&self, level: &Level) -> Drawing {
         let y = self.at_y(level.value);
-        let stroke = Stroke { colour: BLACK, width: 1.0, dash: Dash::Short };
+        let stroke = Stroke {
+            colour: BLACK,
+            width: 1.0,
+            dash: Dash::Short,
+        };
         self.sheet.line(&[(self.left, y), (self.right, y)], stroke)?;
         // Above the line unless that leaves the panel.
-        let text_y = if y - 8.0 > self.top + 6.0 { y - 8.0 } else { y + 8.0 };
-        self.sheet.text(&level.text, (self.left + 5.0, text_y), self.look(Anchor::Left, BLACK))
+        let text_y = if y - 8.0 > self.top + 6.0 {
+            y - 8.0
+        } else {
+            y + 8.0
+        };
+        self.sheet.text(
+            &level.text,
+            (self.left + 5.0, text_y),
+            self.look(Anchor::Left, BLACK),
+        )
     }
 
     fn curve(&self, curve: &Curve) -> Drawing {
-        let stroke = Stroke { colour: curve.style.colour, width: curve.width, dash: curve.style.dash };
+        let stroke = Stroke {
+            colour: curve.style.colour,
+            width: curve.width,
+            dash: curve.style.dash,
+        };
         let is_finite = |p: &Point| p.0.is_finite() && p.1.is_finite();
         for piece in curve.points.split(|p| !is_finite(p)) {
             let points: Vec<Point> = piece.iter().map(|p| self.at(*p)).collect();
@@ -331,7 +411,8 @@ impl<'a, 'b> Painter<'a, 'b> {
         }
         for index in marked(curve).into_iter().filter(|i| is_finite(&curve.points[*i])) {
             let at = self.at(curve.points[index]);
-            self.sheet.marker(at, 3.2, curve.style.colour, curve.style.marker)?;
+            self.sheet
+                .marker(at, 3.2, curve.style.colour, curve.style.marker)?;
         }
         Ok(())
     }
@@ -364,16 +445,26 @@ mod tests {
 
     #[test]
     fn legend_wraps_inside_the_page() {
-        let style = Style { colour: BLACK, dash: Dash::Solid, marker: Marker::Circle };
+        let style = Style {
+            colour: BLACK,
+            dash: Dash::Solid,
+            marker: Marker::Circle,
+        };
         let entries: Vec<(String, Style)> = (0..30).map(|i| (format!("method-{i}"), style)).collect();
         let placed = lay_out_legend(&entries);
-        assert!(placed.iter().all(|((x, _), e)| x + key_width(&e.0) <= WIDTH), "an entry leaves the page");
+        assert!(
+            placed.iter().all(|((x, _), e)| x + key_width(&e.0) <= WIDTH),
+            "an entry leaves the page"
+        );
         assert!(placed.last().unwrap().0.1 >= 2.0 * LEGEND_LINE, "{placed:?}");
     }
 
     #[test]
     fn long_remarks_are_broken() {
         let lines = wrapped(&"word ".repeat(100));
-        assert!(lines.len() > 2 && lines.iter().all(|l| text_width(l, TICK_SIZE) < WIDTH), "{lines:?}");
+        assert!(
+            lines.len() > 2 && lines.iter().all(|l| text_width(l, TICK_SIZE) < WIDTH),
+            "{lines:?}"
+        );
     }
 }

@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::panel::{Curve, Figure, Markers, Panel, PanelRow};
 use super::style::{BLACK, Dash, Marker, Style};
-use super::{Obstacle, Studio, milliseconds};
+use super::{Points, Obstacle, Studio, milliseconds};
 use crate::records::Quality;
 use crate::statistics::line_fit;
 
@@ -16,7 +16,7 @@ pub(super) fn posture(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
     let runs = studio.runs_of_suite(SUITE);
     let traced = studio.with_traces(runs)?;
     let mut curves: Vec<Curve> = Vec::new();
-    let mut main: Vec<(f64, f64)> = Vec::new();
+    let mut main: Points = Vec::new();
     for one in &traced {
         let torque = |q: &Quality| q.torque_squared_mean_n2m2;
         let knee = one.trace.column("LKneeSag").and_then(|c| c.first().copied());
@@ -40,36 +40,60 @@ pub(super) fn posture(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
         }
     }
     let Some(first) = traced.first().filter(|_| !curves.is_empty()) else {
-        return Err(Obstacle::NoData(format!("no run with a trace and a torque on {SUITE}")));
+        return Err(Obstacle::NoData(format!(
+            "no run with a trace and a torque on {SUITE}"
+        )));
     };
     for curve in &mut curves {
         curve.points.sort_by(|a, b| a.0.total_cmp(&b.0));
     }
-    let mut panel =
-        Panel::new("", Axis::linear("left knee at the start (rad)"), Axis::linear("mean Στ² for t ≥ 1 s (N²m²)"));
+    let mut panel = Panel::new(
+        "",
+        Axis::linear("left knee at the start (rad)"),
+        Axis::linear("mean Στ² for t ≥ 1 s (N²m²)"),
+    );
     panel.curves = curves;
     panel.curves.extend(fitted(&main));
     let dt = milliseconds(first.run.row.dt_s);
-    let title = format!("Fig. 7  Static torque from stretched to crouched: {SUITE}, all scenarios, Δt = {dt} ms");
-    let rows = vec![PanelRow { height: 420.0, panels: vec![panel] }];
-    Ok(Figure { title, rows, remarks: remarks(main), keys: Vec::new() }.render()?)
+    let title =
+        format!("Fig. 7  Static torque from stretched to crouched: {SUITE}, all scenarios, Δt = {dt} ms");
+    let rows = vec![PanelRow {
+        height: 420.0,
+        panels: vec![panel],
+    }];
+    Ok(Figure {
+        title,
+        rows,
+        remarks: remarks(main),
+        keys: Vec::new(),
+    }
+    .render()?)
 }
 
 fn fitted(points: &[(f64, f64)]) -> Option<Curve> {
     let (intercept, slope) = line_fit(points)?;
-    let ends = points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.0), h.max(p.0)));
+    let ends = points
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| {
+            (l.min(p.0), h.max(p.0))
+        });
     Some(Curve {
         name: format!("linear fit {intercept:.0} + {slope:.0} q"),
         points: [ends.0, ends.1].map(|x| (x, intercept + slope * x)).to_vec(),
-        style: Style { colour: BLACK, dash: Dash::Short, marker: Marker::Circle },
+        style: Style {
+            colour: BLACK,
+            dash: Dash::Short,
+            marker: Marker::Circle,
+        },
         width: 1.4,
         markers: Markers::None,
     })
 }
 
-fn remarks(mut points: Vec<(f64, f64)>) -> Vec<String> {
+fn remarks(mut points: Points) -> Vec<String> {
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut remarks = vec!["τ²: sum over the leg joints of squared quasi-static torques, both soles loaded.".to_owned()];
+    let mut remarks =
+        vec!["τ²: sum over the leg joints of squared quasi-static torques, both soles loaded.".to_owned()];
     if let [first, .., last] = points[..] {
         remarks.push(format!(
             "{} n={}: start knee {:.2} rad needs {:.1} times the Στ² of {:.2} rad.",

@@ -4,6 +4,7 @@
 
 use super::style::{BLACK, Dash, Marker, Style, WHITE};
 use plotters::coord::Shift;
+use plotters::element::{DashedPathElement, Drawable, PointCollection};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -95,7 +96,7 @@ fn message(error: impl std::fmt::Display) -> String {
 impl Sheet<'_> {
     fn put<E>(&self, element: E) -> Drawing
     where
-        for<'e> &'e E: plotters::element::PointCollection<'e, (i32, i32)>,
+        for<'e> &'e E: PointCollection<'e, (i32, i32)>,
         E: for<'b> Drawable<SVGBackend<'b>>,
     {
         self.area.draw(&element).map_err(message)
@@ -111,7 +112,12 @@ impl Sheet<'_> {
             Dash::Short => (5.0, 3.0),
             Dash::Dotted => (1.7, 2.3),
         };
-        self.put(DashedPathElement::new(path.into_iter(), pixels(dash), pixels(gap), look))
+        self.put(DashedPathElement::new(
+            path,
+            pixels(dash),
+            pixels(gap),
+            look,
+        ))
     }
 
     /// A filled rectangle.
@@ -121,7 +127,10 @@ impl Sheet<'_> {
 
     /// The outline of a rectangle.
     pub(super) fn frame(&self, corner: Point, opposite: Point, colour: RGBColor) -> Drawing {
-        self.put(Rectangle::new([pixel(corner), pixel(opposite)], colour.stroke_width(FINENESS as u32)))
+        self.put(Rectangle::new(
+            [pixel(corner), pixel(opposite)],
+            colour.stroke_width(FINENESS as u32),
+        ))
     }
 
     /// A text; its point is at mid-height.
@@ -149,15 +158,21 @@ impl Sheet<'_> {
                 self.put(Circle::new(pixel(at), pixels(radius), WHITE.filled()))?;
                 self.put(Circle::new(pixel(at), pixels(radius), thin))
             }
-            Marker::Square => {
-                self.put(Rectangle::new([corner(-0.85, -0.85), corner(0.85, 0.85)], colour.filled()))
-            }
+            Marker::Square => self.put(Rectangle::new(
+                [corner(-0.85, -0.85), corner(0.85, 0.85)],
+                colour.filled(),
+            )),
             Marker::Triangle => {
                 let corners = vec![corner(0.0, -1.1), corner(1.0, 0.8), corner(-1.0, 0.8)];
                 self.put(Polygon::new(corners, colour.filled()))
             }
             Marker::Diamond => {
-                let corners = vec![corner(0.0, -1.2), corner(1.2, 0.0), corner(0.0, 1.2), corner(-1.2, 0.0)];
+                let corners = vec![
+                    corner(0.0, -1.2),
+                    corner(1.2, 0.0),
+                    corner(0.0, 1.2),
+                    corner(-1.2, 0.0),
+                ];
                 self.put(Polygon::new(corners, colour.filled()))
             }
             Marker::Plus => {
@@ -174,10 +189,18 @@ impl Sheet<'_> {
     /// Piece of line with marker and name, from `at` to the right. Returns nothing; its width is [`key_width`].
     pub(super) fn key(&self, at: Point, name: &str, style: Style) -> Drawing {
         let (x, y) = at;
-        let stroke = Stroke { colour: style.colour, width: 2.0, dash: style.dash };
+        let stroke = Stroke {
+            colour: style.colour,
+            width: 2.0,
+            dash: style.dash,
+        };
         self.line(&[(x, y), (x + KEY_LINE, y)], stroke)?;
         self.marker((x + KEY_LINE / 2.0, y), 3.6, style.colour, style.marker)?;
-        let look = Type { size: KEY_SIZE, anchor: Anchor::Left, colour: BLACK };
+        let look = Type {
+            size: KEY_SIZE,
+            anchor: Anchor::Left,
+            colour: BLACK,
+        };
         self.text(name, (x + KEY_LINE + 6.0, y), look)
     }
 }
@@ -217,14 +240,24 @@ mod tests {
     #[test]
     fn needless_points_are_dropped_and_turns_kept() {
         let straight = [(0, 0), (1, 1), (1, 1), (3, 3), (3, 0), (3, 5)];
-        assert_eq!(without_needless(straight.into_iter()), [(0, 0), (3, 3), (3, 0), (3, 5)]);
+        assert_eq!(
+            without_needless(straight.into_iter()),
+            [(0, 0), (3, 3), (3, 0), (3, 5)]
+        );
     }
 
     #[test]
     fn page_has_its_size_and_text() {
-        let look = Type { size: 12.0, anchor: Anchor::Left, colour: BLACK };
+        let look = Type {
+            size: 12.0,
+            anchor: Anchor::Left,
+            colour: BLACK,
+        };
         let svg = draw(200.0, |s| s.text("Δt < 5 ms", (10.0, 10.0), look)).unwrap();
-        assert!(svg.starts_with("<svg width=\"1000\" height=\"200\" viewBox=\"0 0 3000 600\""), "{svg}");
+        assert!(
+            svg.starts_with("<svg width=\"1000\" height=\"200\" viewBox=\"0 0 3000 600\""),
+            "{svg}"
+        );
         assert!(svg.contains("Δt &lt; 5 ms"), "{svg}");
     }
 }

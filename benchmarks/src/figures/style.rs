@@ -65,8 +65,14 @@ const KNOWN: [(&str, Style); 8] = [
 
 const COLOURS: [RGBColor; 8] = [BLACK, GREEN, VERMILLION, BLUE, PURPLE, ORANGE, SKY, GREY];
 const DASHES: [Dash; 4] = [Dash::Short, Dash::Solid, Dash::Dotted, Dash::Long];
-const MARKERS: [Marker; 6] =
-    [Marker::Square, Marker::Diamond, Marker::Ring, Marker::Cross, Marker::Plus, Marker::Circle];
+const MARKERS: [Marker; 6] = [
+    Marker::Square,
+    Marker::Diamond,
+    Marker::Ring,
+    Marker::Cross,
+    Marker::Plus,
+    Marker::Circle,
+];
 
 /// The styles of all labels of a set of results, the same in each of its figures.
 #[derive(Clone, Debug, Default)]
@@ -77,7 +83,9 @@ impl Styles {
     /// changing fastest.
     pub(super) fn assign<'a>(labels: impl Iterator<Item = &'a str>) -> Self {
         let mut styles: BTreeMap<String, Style> = KNOWN.iter().map(|(l, s)| ((*l).to_owned(), *s)).collect();
-        let mut free = (0..).map(combination).filter(|s| KNOWN.iter().all(|(_, k)| k != s));
+        let mut free = (0..)
+            .map(combination)
+            .filter(|s| KNOWN.iter().all(|(_, k)| k != s));
         let sorted: std::collections::BTreeSet<&str> = labels.collect();
         for label in sorted {
             if !styles.contains_key(label) {
@@ -89,7 +97,10 @@ impl Styles {
 
     /// Style of a label; a plain line for one that was not among those assigned.
     pub(super) fn of(&self, label: &str) -> Style {
-        self.0.get(label).copied().unwrap_or(style(BLACK, Dash::Solid, Marker::Circle))
+        self.0
+            .get(label)
+            .copied()
+            .unwrap_or(style(BLACK, Dash::Solid, Marker::Circle))
     }
 }
 
@@ -111,7 +122,10 @@ mod tests {
 
     #[test]
     fn all_labels_differ_in_style_and_do_not_depend_on_order() {
-        let labels: Vec<String> = (0..40).map(|i| format!("m{i}")).chain(["ik1".to_owned()]).collect();
+        let labels: Vec<String> = (0..40)
+            .map(|i| format!("m{i}"))
+            .chain(["ik1".to_owned()])
+            .collect();
         let styles = Styles::assign(labels.iter().map(String::as_str));
         let reversed = Styles::assign(labels.iter().rev().map(String::as_str));
         for (index, label) in labels.iter().enumerate() {

@@ -1,4 +1,5 @@
-//! The quality numbers of a run, one group of fields at a time. Definitions: [`Quality`] and [`Referee::judge`].
+//! The quality numbers of a run, one group of fields at a time. Definitions: [`Quality`] and
+//! [`Referee::judge`].
 
 use super::limits::{ellipse_value, polygon_excess, position_violation};
 use super::tasks::{TaskError, hard_then_soft, jacobian, rate_of, task_error};
@@ -49,7 +50,9 @@ fn survives(quality: &Quality, com_tolerance_m: f64) -> bool {
         && quality.boundary_value_max.is_none_or(|g| g <= BOUNDARY_TOLERANCE)
         && quality.hard_error_max_m < HARD_TOLERANCE
         && quality.hard_error_max_rad < HARD_TOLERANCE
-        && quality.com_error_max_m.is_none_or(|error| error < com_tolerance_m)
+        && quality
+            .com_error_max_m
+            .is_none_or(|error| error < com_tolerance_m)
 }
 
 /// Root of the mean of squares, and the largest.
@@ -100,17 +103,26 @@ fn judge_tracking(problem: &Problem, readable: &Readable<'_>, quality: &mut Qual
     }
     quality.com_error_rms_m = com.rms();
     quality.com_error_max_m = com.rms().map(|_| com.largest);
-    quality.soft_error_rms = soft.into_iter().filter_map(|(name, spread)| Some((name, spread.rms()?))).collect();
+    quality.soft_error_rms = soft
+        .into_iter()
+        .filter_map(|(name, spread)| Some((name, spread.rms()?)))
+        .collect();
 }
 
 fn record_hard(name: &str, error: &TaskError, quality: &mut Quality) {
     if let Some(m) = error.m {
         raise(&mut quality.hard_error_max_m, m.largest);
-        raise(quality.hard_error_max.entry(format!("{name}_m")).or_default(), m.largest);
+        raise(
+            quality.hard_error_max.entry(format!("{name}_m")).or_default(),
+            m.largest,
+        );
     }
     if let Some(rad) = error.rad {
         raise(&mut quality.hard_error_max_rad, rad.largest);
-        raise(quality.hard_error_max.entry(format!("{name}_rad")).or_default(), rad.largest);
+        raise(
+            quality.hard_error_max.entry(format!("{name}_rad")).or_default(),
+            rad.largest,
+        );
     }
 }
 
@@ -140,9 +152,18 @@ pub(super) fn com_rate_error(
 fn judge_rates(problem: &Problem, readable: &Readable<'_>, dt_s: f64, quality: &mut Quality) {
     let mut rate = Spread::default();
     for (sample, postures) in readable.samples[1..].iter().zip(readable.postures.windows(2)) {
-        let tasks = problem.phases()[sample.phase.0].tasks.iter().map(|(task, _)| *task);
+        let tasks = problem.phases()[sample.phase.0]
+            .tasks
+            .iter()
+            .map(|(task, _)| *task);
         for task in tasks.filter(|&t| problem.tasks()[t].track == Track::CentreOfMass) {
-            rate.add(com_rate_error(problem, task, (&postures[0], &postures[1]), sample.xdot, dt_s));
+            rate.add(com_rate_error(
+                problem,
+                task,
+                (&postures[0], &postures[1]),
+                sample.xdot,
+                dt_s,
+            ));
         }
     }
     quality.com_rate_error_rms_m_s = rate.rms();
@@ -160,7 +181,10 @@ fn judge_joints(problem: &Problem, readable: &Readable<'_>, dt_s: f64, quality: 
         let limits = &coordinate.limits;
         let series: Vec<f64> = readable.samples.iter().map(|s| joints(robot, s)[j]).collect();
         for &q in &series {
-            raise(&mut quality.position_limit_violation_max_rad, position_violation(limits, q));
+            raise(
+                &mut quality.position_limit_violation_max_rad,
+                position_violation(limits, q),
+            );
         }
         for pair in series.windows(2) {
             let (q, velocity) = (pair[1], (pair[1] - pair[0]) / dt_s);
@@ -189,8 +213,8 @@ fn judge_boundary(problem: &Problem, joint: usize, q: f64, velocity: f64, dt_s: 
     }
 }
 
-/// Singular values, largest first. Should the decomposition fail to converge they are reported as zeros, which no reader
-/// takes for a good sign.
+/// Singular values, largest first. Should the decomposition fail to converge they are reported as zeros,
+/// which no reader takes for a good sign.
 fn singular_values(matrix: MatRef<'_, f64>) -> Vec<f64> {
     let count = matrix.nrows().min(matrix.ncols());
     matrix.singular_values().unwrap_or_else(|_| vec![0.0; count])
@@ -198,7 +222,10 @@ fn singular_values(matrix: MatRef<'_, f64>) -> Vec<f64> {
 
 fn rank(values: &[f64]) -> usize {
     let largest = values.first().copied().unwrap_or(0.0);
-    values.iter().filter(|&&value| value > RANK_TOLERANCE * largest).count()
+    values
+        .iter()
+        .filter(|&&value| value > RANK_TOLERANCE * largest)
+        .count()
 }
 
 fn view(matrix: &DMatrix<f64>) -> MatRef<'_, f64> {
@@ -209,7 +236,10 @@ fn judge_ranks(problem: &Problem, readable: &Readable<'_>, quality: &mut Quality
     (quality.sigma_min, quality.hard_rank_min) = (f64::MAX, usize::MAX);
     for (sample, posture) in readable.iter() {
         let (hard, soft) = hard_then_soft(problem, sample.phase);
-        let hard_rows = hard.iter().map(|&t| problem.tasks()[t].track.rows(problem.robot())).sum();
+        let hard_rows = hard
+            .iter()
+            .map(|&t| problem.tasks()[t].track.rows(problem.robot()))
+            .sum();
         let all = jacobian(problem, posture, &[hard, soft].concat());
         let values = singular_values(view(&all));
         quality.sigma_min = quality.sigma_min.min(values.last().copied().unwrap_or(0.0));
@@ -220,8 +250,8 @@ fn judge_ranks(problem: &Problem, readable: &Readable<'_>, quality: &mut Quality
 
 /// Rank of the first `hard_rows` rows of a Jacobian with the singular values `values`.
 ///
-/// Optimisation: taking rows away lowers the largest singular value and, of a matrix with independent rows, raises the
-/// least; independent rows therefore need no second decomposition.
+/// Optimisation: taking rows away lowers the largest singular value and, of a matrix with independent rows,
+/// raises the least; independent rows therefore need no second decomposition.
 fn hard_rank(all: &DMatrix<f64>, values: &[f64], hard_rows: usize) -> usize {
     if rank(values) == all.nrows() {
         return hard_rows;
@@ -233,7 +263,8 @@ fn hard_rank(all: &DMatrix<f64>, values: &[f64], hard_rows: usize) -> usize {
 fn exit_time(referee: &Referee, readable: &Readable<'_>, dt_s: f64) -> Option<f64> {
     let robot = referee.problem.robot();
     let inside = |s: &Sample<'_>| {
-        s.t_s > SETTLED_S + TIME_ROUNDING_S && referee.exit.iter().any(|&j| joints(robot, s)[j] < STRAIGHT_RAD)
+        s.t_s > SETTLED_S + TIME_ROUNDING_S
+            && referee.exit.iter().any(|&j| joints(robot, s)[j] < STRAIGHT_RAD)
     };
     let last = readable.samples.iter().rposition(inside)?;
     (last + 1 < readable.samples.len()).then(|| dt_s * (last + 1) as f64)
@@ -245,7 +276,10 @@ fn torque_squared_mean(referee: &Referee, readable: &Readable<'_>) -> Option<f64
         return None;
     }
     let (mut sum, mut count) = (0.0, 0_u32);
-    for (_, posture) in readable.iter().filter(|(s, _)| s.t_s >= SETTLED_S - TIME_ROUNDING_S) {
+    for (_, posture) in readable
+        .iter()
+        .filter(|(s, _)| s.t_s >= SETTLED_S - TIME_ROUNDING_S)
+    {
         let torques = static_torques(referee.problem.robot(), posture, supports)?;
         sum += torques.iter().map(|t| t * t).sum::<f64>();
         count += 1;

@@ -1,12 +1,13 @@
 //! The referee: recomputes every quality number of a run from the returned configurations alone.
 //!
-//! It judges with its own, deliberately simple kinematics (`tree.rs`), its own error measures (`tasks.rs`), boundary
-//! conditions (`limits.rs`) and torques (`torque.rs`). What a method says about itself is never read, except by
-//! [`Referee::own_stationarity`], which checks such a claim.
+//! It judges with its own, deliberately simple kinematics (`tree.rs`), its own error measures (`tasks.rs`),
+//! boundary conditions (`limits.rs`) and torques (`torque.rs`). What a method says about itself is never
+//! read, except by [`Referee::own_stationarity`], which checks such a claim.
 //!
-//! A run is judged as far as it can be read: up to the first sample that is no configuration (wrong length, a number that
-//! is not finite or beyond [`LARGEST_READABLE`], a root quaternion that is not of unit length), or that has no such target.
-//! Numbers judged are therefore always finite, and a run that ends early has not survived.
+//! A run is judged as far as it can be read: up to the first sample that is no configuration (wrong length, a
+//! number that is not finite or beyond [`LARGEST_READABLE`], a root quaternion that is not of unit length),
+//! or that has no such target. Numbers judged are therefore always finite, and a run that ends early has not
+//! survived.
 
 mod certificate;
 mod judge;
@@ -30,8 +31,8 @@ use ik_core::task::{OrientationCoordinates, Track};
 use std::sync::Arc;
 use tree::Posture;
 
-/// Numbers of a configuration or target beyond this (rad or m) are not judged: neighbouring values are 1e-7 apart there, so
-/// an angle is hardly determined any more, and squares of such numbers must not overflow.
+/// Numbers of a configuration or target beyond this (rad or m) are not judged: neighbouring values are 1e-7
+/// apart there, so an angle is hardly determined any more, and squares of such numbers must not overflow.
 pub const LARGEST_READABLE: f64 = 1e9;
 
 /// How far the norm of a root quaternion may be from one; configurations are renormalised at every step.
@@ -97,8 +98,11 @@ pub enum RefereeError {
         /// The right length.
         needed: usize,
     },
-    /// A vector with an entry that is not finite or too large, or a root quaternion that is not of unit length.
-    #[error("{field}: every number must be finite and at most {LARGEST_READABLE:e}, a root quaternion of unit length")]
+    /// A vector with an entry that is not finite or too large, or a root quaternion that is not of unit
+    /// length.
+    #[error(
+        "{field}: numbers must be finite and at most {LARGEST_READABLE:e}, quaternions of unit length"
+    )]
     Unreadable {
         /// Which vector.
         field: &'static str,
@@ -132,7 +136,11 @@ impl Referee {
             return Err(RefereeError::Tolerance(spec.com_tolerance_m));
         }
         let robot = problem.robot();
-        let exit = spec.exit_joints.iter().map(|name| coordinate(problem, name)).collect::<Result<_, _>>()?;
+        let exit = spec
+            .exit_joints
+            .iter()
+            .map(|name| coordinate(problem, name))
+            .collect::<Result<_, _>>()?;
         if let Some(frame) = spec.torque_supports.iter().find(|f| f.0 >= robot.frames().len()) {
             return Err(RefereeError::Frame {
                 frame: frame.0,
@@ -140,28 +148,34 @@ impl Referee {
                 count: robot.frames().len(),
             });
         }
-        Ok(Self { problem: Arc::clone(problem), spec, exit })
+        Ok(Self {
+            problem: Arc::clone(problem),
+            spec,
+            exit,
+        })
     }
 
     /// Every quality number of a run. All numbers are finite: what cannot be read is left out, and then
     /// [`Quality::survived`] is false. A run whose start cannot be read is [`Quality::default`].
     ///
-    /// Choices beyond the documentation of [`Quality`]: tasks count in the phases they belong to, k = 0 in that of
-    /// k = 1. A compromised pose has two entries in `soft_error_rms`, `<task>_m` and `<task>_rad`. A posture task is
-    /// measured in rad.
+    /// Choices beyond the documentation of [`Quality`]: tasks count in the phases they belong to, k = 0 in
+    /// that of k = 1. A compromised pose has two entries in `soft_error_rms`, `<task>_m` and `<task>_rad`. A
+    /// posture task is measured in rad. Singular values are those of every sample. A polygon reaches past the
+    /// ellipse, so a run that uses all of it does not survive eq. (6).
     pub fn judge(&self, run: &Run<'_>) -> Quality {
         judge::judge(self, run)
     }
 
-    /// The columns documented at [`Trace`], for as many samples as can be read. Joint columns are those of the
-    /// independent coordinates; `<task>_rate_error_m_s` is 0 at k = 0; columns of a task are filled in every phase.
+    /// The columns documented at [`Trace`], for as many samples as can be read. Joint columns are those of
+    /// the independent coordinates; `<task>_rate_error_m_s` is 0 at k = 0; columns of a task are filled in
+    /// every phase.
     pub fn trace(&self, run: &Run<'_>, efforts: &StepEfforts<'_>) -> Trace {
         trace::trace(self, run, efforts)
     }
 
-    /// How far one step is from satisfying the optimality conditions of the plain problem: least sum of squares of the
-    /// compromised rows, subject to the hard rows and the intervals on Δq. Multipliers are the best there are, so the
-    /// certificate needs nothing from the method.
+    /// How far one step is from satisfying the optimality conditions of the plain problem: least sum of
+    /// squares of the compromised rows, subject to the hard rows and the intervals on Δq. Multipliers are the
+    /// best there are, so the certificate needs nothing from the method.
     ///
     /// # Errors
     /// A vector of the wrong length or with unreadable numbers, an unknown phase.
@@ -169,12 +183,16 @@ impl Referee {
         certificate::shared_stationarity(&self.problem, step)
     }
 
-    /// Whether a method has solved its *own* problem: the residual of the conditions it claims (see [`Claim`]), with
-    /// Jacobians by finite differences of the referee's own rows.
+    /// Whether a method has solved its *own* problem: the residual of the conditions it claims (see
+    /// [`Claim`]), with Jacobians by finite differences of the referee's own rows.
     ///
     /// # Errors
     /// As [`Referee::certificate`].
-    pub fn own_stationarity(&self, claim: &Claim, step: &CertifiedStep<'_>) -> Result<OwnStationarity, RefereeError> {
+    pub fn own_stationarity(
+        &self,
+        claim: &Claim,
+        step: &CertifiedStep<'_>,
+    ) -> Result<OwnStationarity, RefereeError> {
         certificate::own_stationarity(&self.problem, claim, step)
     }
 }
@@ -182,11 +200,13 @@ impl Referee {
 fn coordinate(problem: &Problem, name: &str) -> Result<usize, RefereeError> {
     let robot = problem.robot();
     let known = || robot.coordinates().iter().map(|c| c.name.clone());
-    known().position(|other| other == name).ok_or_else(|| RefereeError::Joint {
-        name: name.to_owned(),
-        robot: robot.name().to_owned(),
-        known: known().collect(),
-    })
+    known()
+        .position(|other| other == name)
+        .ok_or_else(|| RefereeError::Joint {
+            name: name.to_owned(),
+            robot: robot.name().to_owned(),
+            known: known().collect(),
+        })
 }
 
 fn is_readable(values: &[f64]) -> bool {
@@ -235,9 +255,16 @@ struct Readable<'a> {
 impl<'a> Readable<'a> {
     fn new(problem: &Problem, run: &Run<'a>) -> Self {
         let samples: Vec<_> = (0..run.q.len()).map_while(|k| sample(problem, run, k)).collect();
-        let postures = samples.iter().map(|s| Posture::new(problem.robot(), s.q)).collect();
+        let postures = samples
+            .iter()
+            .map(|s| Posture::new(problem.robot(), s.q))
+            .collect();
         let complete = !samples.is_empty() && samples.len() == run.q.len();
-        Self { samples, postures, complete }
+        Self {
+            samples,
+            postures,
+            complete,
+        }
     }
 
     fn iter(&self) -> impl Iterator<Item = (&Sample<'a>, &Posture)> {
@@ -249,7 +276,10 @@ impl<'a> Readable<'a> {
 fn sample<'a>(problem: &Problem, run: &Run<'a>, k: usize) -> Option<Sample<'a>> {
     let width = problem.nx() + problem.nxdot();
     let q = run.q[k].as_slice();
-    let (x, xdot) = run.targets.get(k * width..(k + 1) * width)?.split_at(problem.nx());
+    let (x, xdot) = run
+        .targets
+        .get(k * width..(k + 1) * width)?
+        .split_at(problem.nx());
     let phase = match run.phases {
         [only] => *only,
         several => *several.get(k.max(1) - 1)?,
@@ -257,5 +287,11 @@ fn sample<'a>(problem: &Problem, run: &Run<'a>, k: usize) -> Option<Sample<'a>> 
     let readable = is_configuration(problem, q) && is_target(problem, x) && is_readable(xdot);
     let posed = (1.0 / LARGEST_READABLE..LARGEST_READABLE).contains(&run.dt_s);
     let posed = posed && phase.0 < problem.phases().len();
-    (readable && posed).then(|| Sample { t_s: run.dt_s * k as f64, q, x, xdot, phase })
+    (readable && posed).then_some(Sample {
+        t_s: run.dt_s * k as f64,
+        q,
+        x,
+        xdot,
+        phase,
+    })
 }

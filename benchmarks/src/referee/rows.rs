@@ -8,8 +8,8 @@ use ik_core::task::{OrientationCoordinates, Track};
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};
 
-/// Step of the five-point difference (rad, m). Its truncation error h⁴/30 · f⁽⁵⁾ and the rounding error 1.5 ε/h of rows of
-/// size one, 3e-14 and 3e-13, are then both small.
+/// Step of the five-point difference (rad, m). Its truncation error h⁴/30 · f⁽⁵⁾ and the rounding error 1.5
+/// ε/h of rows of size one, 3e-14 and 3e-13, are then both small.
 const DIFFERENCE_STEP: f64 = 1e-3;
 
 /// `q ⊕ dq`: positions and joints add, the root turns by the world rotation vector.
@@ -42,7 +42,11 @@ pub(super) fn difference(robot: &Robot, q_prev: &[f64], q: &[f64]) -> Vec<f64> {
 /// Roll, pitch and yaw of a rotation `R = Rz(yaw) Ry(pitch) Rx(roll)`.
 fn rpy(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
     let r = rotation.to_rotation_matrix();
-    Vector3::new(r[(2, 1)].atan2(r[(2, 2)]), -r[(2, 0)].clamp(-1.0, 1.0).asin(), r[(1, 0)].atan2(r[(0, 0)]))
+    Vector3::new(
+        r[(2, 1)].atan2(r[(2, 2)]),
+        -r[(2, 0)].clamp(-1.0, 1.0).asin(),
+        r[(1, 0)].atan2(r[(0, 0)]),
+    )
 }
 
 fn wrap(angle: f64) -> f64 {
@@ -51,7 +55,9 @@ fn wrap(angle: f64) -> f64 {
 
 fn orientation_row(problem: &Problem, now: &UnitQuaternion<f64>, target: &[f64]) -> Vector3<f64> {
     match problem.orientation() {
-        OrientationCoordinates::RollPitchYaw => (rpy(now) - Vector3::from_column_slice(&target[..3])).map(wrap),
+        OrientationCoordinates::RollPitchYaw => {
+            (rpy(now) - Vector3::from_column_slice(&target[..3])).map(wrap)
+        }
         OrientationCoordinates::Log => {
             (now * target_rotation(OrientationCoordinates::Log, target).inverse()).scaled_axis()
         }

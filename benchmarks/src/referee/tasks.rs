@@ -1,5 +1,6 @@
-//! What a task demands and by how much a posture misses it, measured geometrically: metres between points, the angle of
-//! one rotation between attitudes. The problem's orientation coordinates only say how a target is written.
+//! What a task demands and by how much a posture misses it, measured geometrically: metres between points,
+//! the angle of one rotation between attitudes. The problem's orientation coordinates only say how a target
+//! is written.
 
 use super::tree::Posture;
 use ik_core::problem::{PhaseId, Problem};
@@ -34,7 +35,9 @@ pub(super) fn tracked_frames(track: Track) -> (Option<FrameId>, Option<FrameId>)
 /// The part of x that belongs to a task.
 pub(super) fn target_of<'a>(problem: &Problem, task: usize, x: &'a [f64]) -> &'a [f64] {
     let start = problem.slots()[task].x;
-    let length = problem.tasks()[task].track.target_len(problem.robot(), problem.orientation());
+    let length = problem.tasks()[task]
+        .track
+        .target_len(problem.robot(), problem.orientation());
     &x[start..start + length]
 }
 
@@ -67,23 +70,39 @@ fn distance(now: &Vector3<f64>, target: &[f64]) -> Option<Miss> {
 }
 
 /// By how much `posture`, at the configuration `q`, misses the target of a task in `x`.
-pub(super) fn task_error(problem: &Problem, posture: &Posture, q: &[f64], task: usize, x: &[f64]) -> TaskError {
+pub(super) fn task_error(
+    problem: &Problem,
+    posture: &Posture,
+    q: &[f64],
+    task: usize,
+    x: &[f64],
+) -> TaskError {
     let robot = problem.robot();
     let target = target_of(problem, task, x);
     match problem.tasks()[task].track {
-        Track::CentreOfMass => TaskError { m: distance(&posture.com, target), rad: None },
+        Track::CentreOfMass => TaskError {
+            m: distance(&posture.com, target),
+            rad: None,
+        },
         Track::Posture => {
             let joints = q[robot.root().nq()..].iter().zip(target);
-            TaskError { m: None, rad: Some(miss(joints.map(|(now, target)| now - target))) }
+            TaskError {
+                m: None,
+                rad: Some(miss(joints.map(|(now, target)| now - target))),
+            }
         }
         track => {
             let (position, orientation) = tracked_frames(track);
-            let m = position.and_then(|f| distance(&posture.frame(robot, f).translation.vector, &target[..3]));
+            let m =
+                position.and_then(|f| distance(&posture.frame(robot, f).translation.vector, &target[..3]));
             let rad = orientation.map(|f| {
                 let written = &target[if position.is_some() { 3 } else { 0 }..];
                 let wanted = target_rotation(problem.orientation(), written);
                 let angle = posture.frame(robot, f).rotation.angle_to(&wanted);
-                Miss { norm: angle, largest: angle }
+                Miss {
+                    norm: angle,
+                    largest: angle,
+                }
             });
             TaskError { m, rad }
         }
@@ -92,8 +111,10 @@ pub(super) fn task_error(problem: &Problem, posture: &Posture, q: &[f64], task: 
 
 /// Indices of the tasks of a phase, hard ones first.
 pub(super) fn hard_then_soft(problem: &Problem, phase: PhaseId) -> (Vec<usize>, Vec<usize>) {
-    let (hard, soft): (Vec<_>, Vec<_>) =
-        problem.phases()[phase.0].tasks.iter().partition(|(_, priority)| *priority == Priority::Hard);
+    let (hard, soft): (Vec<_>, Vec<_>) = problem.phases()[phase.0]
+        .tasks
+        .iter()
+        .partition(|(_, priority)| *priority == Priority::Hard);
     let index = |tasks: Vec<&(usize, Priority)>| tasks.into_iter().map(|(task, _)| *task).collect();
     (index(hard), index(soft))
 }

@@ -1,8 +1,9 @@
 //! Static joint torques from virtual work: the potential energy's gradient less what the supports carry.
 //!
-//! With `g = M g₀ ∂z_com/∂v` and the support wrenches w (force and moment about each support's origin, world axes), the
-//! root rows `Σ Jᵢᵀ wᵢ = g` leave w free as soon as there are two supports; the one of least Euclidean norm (N and Nm
-//! mixed) is taken. Here it comes from a QR decomposition of the transposed root rows, `Aᵀ = QR`, `w = Q R⁻ᵀ g`.
+//! With `g = M g₀ ∂z_com/∂v` and the support wrenches w (force and moment about each support's origin, world
+//! axes), the root rows `Σ Jᵢᵀ wᵢ = g` leave w free as soon as there are two supports; the one of least
+//! Euclidean norm (N and Nm mixed) is taken. Here it comes from a QR decomposition of the transposed root
+//! rows, `Aᵀ = QR`, `w = Q R⁻ᵀ g`.
 
 use super::tree::{Posture, moving_mass_kg};
 use ik_core::robot::{FrameId, Robot, Root};
@@ -18,8 +19,9 @@ fn potential_gradient(robot: &Robot, posture: &Posture) -> DVector<f64> {
     com.row(2).transpose() * (moving_mass_kg(robot) * STANDARD_GRAVITY_M_S2)
 }
 
-/// Torque (Nm, N for a prismatic joint) of each independent coordinate that holds the robot still on `supports`; a fixed
-/// root needs none and ignores them. None if the supports cannot carry a floating root (there are none).
+/// Torque (Nm, N for a prismatic joint) of each independent coordinate that holds the robot still on
+/// `supports`; a fixed root needs none and ignores them. None if the supports cannot carry a floating root
+/// (there are none).
 pub(super) fn static_torques(robot: &Robot, posture: &Posture, supports: &[FrameId]) -> Option<Vec<f64>> {
     let gradient = potential_gradient(robot, posture);
     let first = robot.root().nv();
@@ -31,7 +33,10 @@ pub(super) fn static_torques(robot: &Robot, posture: &Posture, supports: &[Frame
         posture.add_position_rows(robot, support, 6 * i, &mut jacobian);
         posture.add_rotation_rows(robot, support, 6 * i + 3, &mut jacobian);
     }
-    let wrench = least_norm(jacobian.columns(0, first).into_owned(), gradient.rows(0, first).into_owned())?;
+    let wrench = least_norm(
+        jacobian.columns(0, first).into_owned(),
+        gradient.rows(0, first).into_owned(),
+    )?;
     let torque = gradient - jacobian.transpose() * wrench;
     Some(torque.as_slice()[first..].to_vec())
 }

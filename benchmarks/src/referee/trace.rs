@@ -24,7 +24,9 @@ pub(super) fn trace(referee: &Referee, run: &Run<'_>, efforts: &StepEfforts<'_>)
     let readable = Readable::new(&referee.problem, run);
     Trace {
         columns: columns(referee),
-        rows: (0..readable.samples.len()).map(|k| row(referee, &readable, k, run.dt_s, efforts)).collect(),
+        rows: (0..readable.samples.len())
+            .map(|k| row(referee, &readable, k, run.dt_s, efforts))
+            .collect(),
     }
 }
 
@@ -48,7 +50,11 @@ fn columns(referee: &Referee) -> Vec<String> {
 
 fn task_columns(problem: &Problem, task: usize, columns: &mut Vec<String>) {
     let (name, track) = (&problem.tasks()[task].name, problem.tasks()[task].track);
-    columns.extend(target_components(problem, track).into_iter().map(|c| format!("{name}_target_{c}")));
+    columns.extend(
+        target_components(problem, track)
+            .into_iter()
+            .map(|c| format!("{name}_target_{c}")),
+    );
     let (position, orientation) = tracked_frames(track);
     if position.is_some() || track == Track::CentreOfMass {
         columns.push(format!("{name}_error_m"));
@@ -71,7 +77,12 @@ fn target_components(problem: &Problem, track: Track) -> Vec<String> {
         Track::Position(_) | Track::CentreOfMass => position(),
         Track::Orientation(_) => orientation(),
         Track::Pose(_) => [position(), orientation()].concat(),
-        Track::Posture => problem.robot().coordinates().iter().map(|c| c.name.clone()).collect(),
+        Track::Posture => problem
+            .robot()
+            .coordinates()
+            .iter()
+            .map(|c| c.name.clone())
+            .collect(),
     }
 }
 
@@ -89,8 +100,17 @@ fn row(
     for task in 0..problem.tasks().len() {
         task_values(problem, readable, k, task, dt_s, &mut row);
     }
-    let count = |counts: &[u32]| k.checked_sub(1).and_then(|i| counts.get(i)).map_or(0.0, |&n| f64::from(n));
-    row.push(k.checked_sub(1).and_then(|i| efforts.step_us.get(i)).copied().unwrap_or(0.0));
+    let count = |counts: &[u32]| {
+        k.checked_sub(1)
+            .and_then(|i| counts.get(i))
+            .map_or(0.0, |&n| f64::from(n))
+    };
+    row.push(
+        k.checked_sub(1)
+            .and_then(|i| efforts.step_us.get(i))
+            .copied()
+            .unwrap_or(0.0),
+    );
     row.extend([count(efforts.majors), count(efforts.minors)]);
     let supports = &referee.spec.torque_supports;
     if !supports.is_empty() {
@@ -115,6 +135,8 @@ fn task_values(
     row.extend([error.m, error.rad].into_iter().flatten().map(|miss| miss.norm));
     if problem.tasks()[task].track == Track::CentreOfMass {
         let before = k.checked_sub(1).map(|i| &readable.postures[i]);
-        row.push(before.map_or(0.0, |b| com_rate_error(problem, task, (b, posture), sample.xdot, dt_s)));
+        row.push(before.map_or(0.0, |b| {
+            com_rate_error(problem, task, (b, posture), sample.xdot, dt_s)
+        }));
     }
 }

@@ -1,9 +1,9 @@
 //! The referee's kinematics: products of transforms down the tree, and velocities read off axes and points.
 //!
-//! Deliberately plain. It uses the public description of the robot (poses of the joints in their parents, axes, masses)
-//! and shares nothing with the aligned, vectorised pass the methods run on, so that an error there is seen here.
-//! Velocity coordinates: linear velocity of the root origin, angular velocity of the root, both in world axes, then one
-//! rate per independent coordinate.
+//! Deliberately plain. It uses the public description of the robot (poses of the joints in their parents,
+//! axes, masses) and shares nothing with the aligned, vectorised pass the methods run on, so that an error
+//! there is seen here. Velocity coordinates: linear velocity of the root origin, angular velocity of the
+//! root, both in world axes, then one rate per independent coordinate.
 
 use ik_core::robot::{FrameId, Joint, Motion, Robot, Root};
 use nalgebra::{DMatrix, Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
@@ -31,7 +31,10 @@ fn root_pose(robot: &Robot, q: &[f64]) -> Isometry3<f64> {
 
 fn motion(joint: &Joint, value: f64) -> Isometry3<f64> {
     let (turn, slide) = match joint.motion {
-        Motion::Revolute => (UnitQuaternion::from_axis_angle(&joint.axis, value), Vector3::zeros()),
+        Motion::Revolute => (
+            UnitQuaternion::from_axis_angle(&joint.axis, value),
+            Vector3::zeros(),
+        ),
         Motion::Prismatic => (UnitQuaternion::identity(), joint.axis.into_inner() * value),
     };
     Isometry3::from_parts(slide.into(), turn)
@@ -56,9 +59,9 @@ impl Posture {
         self.bodies[frame.body] * frame.x_body_frame
     }
 
-    /// Calls `column(v, linear, angular)` with the velocity that each velocity coordinate gives to the point `p_w` (world)
-    /// of a body; coordinates that do not move it are left out, one that moves it through several joints comes several
-    /// times, to be added.
+    /// Calls `column(v, linear, angular)` with the velocity that each velocity coordinate gives to the point
+    /// `p_w` (world) of a body; coordinates that do not move it are left out, one that moves it through
+    /// several joints comes several times, to be added.
     pub(super) fn for_each_column(
         &self,
         robot: &Robot,
@@ -89,22 +92,40 @@ impl Posture {
     }
 
     /// Adds the Jacobian of a frame's origin to three rows of `out`.
-    pub(super) fn add_position_rows(&self, robot: &Robot, frame: FrameId, row: usize, out: &mut DMatrix<f64>) {
+    pub(super) fn add_position_rows(
+        &self,
+        robot: &Robot,
+        frame: FrameId,
+        row: usize,
+        out: &mut DMatrix<f64>,
+    ) {
         let point = self.frame(robot, frame).translation.vector;
-        self.for_each_column(robot, robot.frames()[frame.0].body, &point, |v, linear, _| add(out, row, v, linear));
+        self.for_each_column(robot, robot.frames()[frame.0].body, &point, |v, linear, _| {
+            add(out, row, v, linear)
+        });
     }
 
     /// Adds the Jacobian of a frame's angular velocity to three rows of `out`.
-    pub(super) fn add_rotation_rows(&self, robot: &Robot, frame: FrameId, row: usize, out: &mut DMatrix<f64>) {
+    pub(super) fn add_rotation_rows(
+        &self,
+        robot: &Robot,
+        frame: FrameId,
+        row: usize,
+        out: &mut DMatrix<f64>,
+    ) {
         let body = robot.frames()[frame.0].body;
-        self.for_each_column(robot, body, &Vector3::zeros(), |v, _, angular| add(out, row, v, angular));
+        self.for_each_column(robot, body, &Vector3::zeros(), |v, _, angular| {
+            add(out, row, v, angular)
+        });
     }
 
     /// Adds the Jacobian of the centre of mass to three rows of `out`: the mean of those of all bodies.
     pub(super) fn add_com_rows(&self, robot: &Robot, row: usize, out: &mut DMatrix<f64>) {
         let total = moving_mass_kg(robot);
         for (body, mass_kg, point) in moving_masses(robot, &self.bodies) {
-            self.for_each_column(robot, body, &point, |v, linear, _| add(out, row, v, linear * (mass_kg / total)));
+            self.for_each_column(robot, body, &point, |v, linear, _| {
+                add(out, row, v, linear * (mass_kg / total))
+            });
         }
     }
 }
@@ -124,7 +145,13 @@ fn moving_masses<'a>(
     bodies
         .skip(fixed_bodies(robot))
         .filter(|(_, (body, _))| body.mass_kg > 0.0)
-        .map(|(i, (body, pose))| (i, body.mass_kg, pose.rotation * body.com + pose.translation.vector))
+        .map(|(i, (body, pose))| {
+            (
+                i,
+                body.mass_kg,
+                pose.rotation * body.com + pose.translation.vector,
+            )
+        })
 }
 
 /// Bodies that never move: the root, unless it floats.
@@ -137,7 +164,12 @@ fn fixed_bodies(robot: &Robot) -> usize {
 
 /// Mass of everything that can move (kg).
 pub(super) fn moving_mass_kg(robot: &Robot) -> f64 {
-    robot.bodies().iter().skip(fixed_bodies(robot)).map(|body| body.mass_kg).sum()
+    robot
+        .bodies()
+        .iter()
+        .skip(fixed_bodies(robot))
+        .map(|body| body.mass_kg)
+        .sum()
 }
 
 fn centre_of_mass(robot: &Robot, poses: &[Isometry3<f64>]) -> Vector3<f64> {
@@ -147,5 +179,9 @@ fn centre_of_mass(robot: &Robot, poses: &[Isometry3<f64>]) -> Vector3<f64> {
         moment += point * mass_kg;
         mass += mass_kg;
     }
-    if mass > 0.0 { moment / mass } else { Vector3::zeros() }
+    if mass > 0.0 {
+        moment / mass
+    } else {
+        Vector3::zeros()
+    }
 }

@@ -6,6 +6,7 @@ mod problem_spec;
 
 pub use case::{Case, Variation};
 pub use lineup::{Selection, lineup};
+pub(crate) use lineup::{build, known_method};
 pub use problem_spec::{LimitsSpec, PrioritySpec, ProblemSpec, RobotSpec, TaskSpec, TrackSpec};
 
 use crate::error::InputError;

@@ -10,4 +10,4 @@ pub use samples::{Grid, Rates, Samples};
 pub use shape::Shape;
 pub use targets::{MotionSpec, Trajectory};
 
-pub(crate) use targets::{component_names, task_values};
+pub(crate) use targets::task_values;

@@ -13,10 +13,10 @@
 //! Nothing is allocated after construction for problems up to the given size.
 
 use super::dual::{Dual, norm_max};
-use super::elimination::{Elimination, MAX_UNKNOWNS, Rows};
-use super::kernels::{LANES, add_scaled, add_scaled4, max_abs};
+use super::elimination::{DEPENDENT, Elimination, NEARLY_DEPENDENT, MAX_UNKNOWNS, Rows};
+use super::kernels::max_abs;
 use super::reduced::Reduced;
-use super::{MatRef, Qp, QpSolution, QpSolver, QpStatus};
+use super::{Qp, QpSolution, QpSolver, QpStatus};
 
 /// A reduced residual below this fraction of the gradient's terms is rounding: 100 times what the sums of
 /// about 20 terms leave.
@@ -49,8 +49,7 @@ pub struct ActiveSet {
     warm: Vec<(usize, f64)>,
     /// Position of each unknown.
     position: Vec<usize>,
-    /// Point and gradient in the order of the problem, gradient in positions, reduced residual.
-    x: Vec<f64>,
+    /// Gradient in the order of the problem, gradient in positions, reduced residual.
     gradient: Vec<f64>,
     at_positions: Vec<f64>,
     residual: Vec<f64>,
@@ -71,7 +70,6 @@ impl ActiveSet {
             dual: Dual::new(n),
             warm: Vec::with_capacity(n),
             position: vec![0; n],
-            x: vec![0.0; n],
             gradient: vec![0.0; n],
             at_positions: vec![0.0; n],
             residual: vec![0.0; n],
@@ -147,13 +145,9 @@ impl ActiveSet {
     /// leaves the former in `self.residual` and the gradient H x + g in positions.
     fn relative_residual(&mut self, qp: &Qp<'_>) -> f64 {
         self.reduced.complete(&mut self.dual.x);
-        for (&unknown, &value) in self.reduced.order.iter().zip(&self.dual.x) {
-            self.x[unknown] = value;
-        }
         let n = qp.unknowns();
         let gradient = &mut self.gradient[..n];
-        gradient.copy_from_slice(qp.g);
-        add_product(&qp.h, &self.x[..n], gradient);
+        self.reduced.gradient_into(&self.dual.x, gradient);
         for (out, &unknown) in self.at_positions.iter_mut().zip(&self.reduced.order) {
             *out = gradient[unknown];
         }
@@ -178,7 +172,7 @@ impl ActiveSet {
             out.z[self.reduced.order[position]] = z;
             self.at_positions[position] -= z;
         }
-        self.elimination.multipliers_into(&mut self.at_positions[..self.reduced.rank()], &mut out.y);
+        self.elimination.multipliers_into(&self.at_positions[..self.reduced.rank()], &mut out.y);
     }
 
     fn write_point(&mut self, qp: &Qp<'_>, out: &mut QpSolution) {
@@ -188,6 +182,25 @@ impl ActiveSet {
         }
         clip(&mut out.x, qp.lo, qp.hi);
         out.minors = self.dual.minors;
+    }
+
+    /// Steps 1 to 5, with rows whose remainder is below `dependent` left out.
+    fn attempt(&mut self, qp: &Qp<'_>, dependent: f64, out: &mut QpSolution) -> QpStatus {
+        let rows = self.elimination.run(qp, dependent);
+        if rows == Rows::NotFinite {
+            self.warm.clear();
+            clip(&mut out.x, qp.lo, qp.hi);
+            return QpStatus::Numerical;
+        }
+        self.reduced.load(&mut self.elimination);
+        self.dual.load(&self.reduced, qp.lo, qp.hi);
+        let status = if rows == Rows::Consistent { self.minimise(qp) } else { QpStatus::Infeasible };
+        if status == QpStatus::Solved {
+            self.write_multipliers(out);
+        }
+        self.write_point(qp, out);
+        self.remember(status);
+        status
     }
 
     fn remember(&mut self, status: QpStatus) {
@@ -209,20 +222,16 @@ impl QpSolver for ActiveSet {
             return status;
         }
         self.make_room(qp);
-        let rows = self.elimination.run(qp);
-        if rows == Rows::NotFinite {
-            self.warm.clear();
-            clip(&mut out.x, qp.lo, qp.hi);
-            return QpStatus::Numerical;
+        let status = self.attempt(qp, DEPENDENT, out);
+        if status != QpStatus::Numerical || qp.equalities() == 0 {
+            return status;
         }
-        self.reduced.load(&self.elimination);
-        self.dual.load(&self.reduced, qp.lo, qp.hi);
-        let status = if rows == Rows::Consistent { self.minimise(qp) } else { QpStatus::Infeasible };
-        if status == QpStatus::Solved {
-            self.write_multipliers(out);
-        }
-        self.write_point(qp, out);
-        self.remember(status);
+        // Rows that are nearly dependent cost the accuracy: once more without them.
+        self.warm.clear();
+        let tried = out.minors;
+        out.clear_for(qp);
+        let status = self.attempt(qp, NEARLY_DEPENDENT, out);
+        out.minors += tried;
         status
     }
 
@@ -255,18 +264,5 @@ pub(super) fn clip(x: &mut [f64], lo: &[f64], hi: &[f64]) {
         let inner = if x.is_finite() { *x } else { 0.0 };
         let clipped = inner.max(*lo).min(*hi);
         *x = if clipped.is_finite() { clipped } else { 0.0 };
-    }
-}
-
-/// out += H x.
-fn add_product(h: &MatRef<'_>, x: &[f64], out: &mut [f64]) {
-    let n = x.len();
-    let whole = n / LANES * LANES;
-    for first in (0..whole).step_by(LANES) {
-        let weights = std::array::from_fn(|lane| x[first + lane]);
-        add_scaled4(out, weights, std::array::from_fn(|lane| h.col(first + lane)));
-    }
-    for (j, weight) in x.iter().enumerate().skip(whole) {
-        add_scaled(out, *weight, h.col(j));
     }
 }

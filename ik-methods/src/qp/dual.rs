@@ -268,6 +268,7 @@ impl Dual {
             let blocking = self.blocking().filter(|blocking| blocking.step < full);
             let step = blocking.map_or(full, |blocking| blocking.step);
             if step == f64::INFINITY {
+
                 return QpStatus::Infeasible;
             }
             self.shift_multipliers(step);

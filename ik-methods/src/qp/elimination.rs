@@ -12,11 +12,13 @@
 //! Rows whose remainder has become small are put off until the others are done and are then taken in the
 //! order of their size (complete pivoting among them); what is left at rounding level is dependent.
 //!
-//! Storage: per column of [A b] two runs of `ld` entries (rows padded to whole blocks), first the part
-//! above the diagonal (U) then the part below (L and what is not yet eliminated). The update of a column may
-//! then start at a whole block: it spoils only entries of the lower run that are never read again.
+//! Storage is by rows, padded to whole blocks: place 0 of a row is its right-hand side, place j + 1 belongs to
+//! unknown j. Nothing is swapped between columns: a row of U is zero at the unknowns eliminated before, so
+//! subtracting it leaves the entries of L there untouched.
 
-use super::kernels::{GROUP, LANES, copy_padded, dot, group_of, padded, subtract_scaled_group};
+use std::ops::Range;
+
+use super::kernels::{GROUP, LANES, padded, subtract_scaled_blocks, subtract_scaled_group};
 use super::{MatRef, Qp};
 
 /// A row is put off when its largest remaining entry falls below this fraction of its original 1-norm.
@@ -27,12 +29,20 @@ const POSTPONED: f64 = 1e-4;
 
 /// A row is dependent when its largest remaining entry is below this fraction of its original 1-norm.
 ///
-/// Rounding leaves about n * 2.2e-16 (1e-14 for n = 60) times the growth of the elimination (in practice
-/// below 100). A real remainder this small could only be met by moving the unknowns 1e12 times as far.
-const DEPENDENT: f64 = 1e-12;
+/// Unknowns are metres and radians and move by less than 1, in tracking by some 0.02: leaving out such a remainder
+/// misses the row by about 2e-9 of its scale. Meeting it instead would amplify rounding by 1e7 and more. A posture on a
+/// singularity to the last step tolerance (1e-9 rad) leaves remainders of that order, with and without rounding.
+pub(super) const DEPENDENT: f64 = 1e-7;
 
-/// A dependent row holds when its reduced right-hand side is below this fraction of the row's own terms.
+/// The same for a second attempt, where the first one lost its accuracy.
+pub(super) const NEARLY_DEPENDENT: f64 = 1e-5;
+
+/// A dependent row holds when its reduced right-hand side is below this fraction of the row's own terms, or below
+/// [`SHARE`] of the remainder that was left out.
 const CONSISTENT: f64 = 1e-10;
+
+/// Part of the largest remainder left out (times a motion of size 1) that a dependent row may miss.
+const SHARE: f64 = 1e-3;
 
 /// Weight of a bounded unknown in the choice of the pivot; unknowns without bounds count fully.
 ///
@@ -43,8 +53,11 @@ const BOUNDED_WEIGHT: f64 = 0.25;
 /// Bits of a pivot key that hold the index of the candidate instead of the tail of its magnitude.
 const INDEX_MASK: u64 = 0xFFF;
 
+/// The other bits, without the sign.
+const MAGNITUDE_MASK: u64 = !INDEX_MASK & (u64::MAX >> 1);
+
 /// Largest number of unknowns the pivot keys can index.
-pub(super) const MAX_UNKNOWNS: usize = INDEX_MASK as usize + 1;
+pub(super) const MAX_UNKNOWNS: usize = INDEX_MASK as usize;
 
 /// Result of [`Elimination::run`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,43 +73,60 @@ pub(super) enum Rows {
 /// Workspace and factors.
 #[derive(Clone, Debug)]
 pub(super) struct Elimination {
+    dependent: f64,
     m: usize,
     n: usize,
-    /// Padded number of rows.
+    /// Padded length of a row.
     ld: usize,
-    /// n + 1 columns of `2 * ld` entries: upper run, lower run.
-    store: Vec<f64>,
+    /// [b A] while it is eliminated; L stays at the places of the pivots.
+    lower: Vec<f64>,
+    /// Rows of U without their unit diagonal.
+    upper: Vec<f64>,
+    /// Reciprocal of the diagonal of L.
+    inverse_pivot: Vec<f64>,
+    /// Pivot preference of each place, 0 if it cannot be a pivot.
+    weight: Vec<f64>,
+    /// 1 at places still alive (unknowns not eliminated and the right-hand side), else 0.
+    alive: Vec<f64>,
+    /// 0, 1, 2, ...: places as bits of pivot keys.
+    place_bits: Vec<u64>,
+    /// Unknown eliminated in each step: B.
+    pub(super) pivots: Vec<usize>,
+    /// Unknowns not eliminated: N.
+    pub(super) remaining: Vec<usize>,
+    /// Place of the right-hand side, then of N, then 0 up to a whole number of blocks.
+    kept_places: Vec<usize>,
     /// Original index of each row in its current place.
     rows: Vec<usize>,
     /// 1-norm of each row of A, moving with the row.
     row_scale: Vec<f64>,
-    /// Pivot preference per column; 0 for the right-hand side.
-    weight: Vec<f64>,
-    /// Column eliminated by each row in turn: B.
-    pub(super) pivots: Vec<usize>,
-    /// Columns still to be updated: the right-hand side and then, in any order, those not eliminated (N).
-    live: Vec<usize>,
-    /// Entry of the next pivot row in each live column.
-    next_row: Vec<f64>,
-    /// Multiple of the pivot column to subtract from each live column.
-    factors: Vec<f64>,
+    /// A column of zeros: the padding of the rows.
+    zeros: Vec<f64>,
+    /// Rows of (c, -T); later the right-hand side of the multipliers, by place.
+    solution: Vec<f64>,
 }
 
 impl Elimination {
     pub(super) fn new(n: usize, m: usize) -> Self {
-        let ld = padded(m);
+        let ld = padded(n + 1);
         Self {
+            dependent: DEPENDENT,
             m: 0,
             n: 0,
-            ld: 0,
-            store: vec![0.0; 2 * ld * (n + 1)],
-            rows: Vec::with_capacity(m),
-            row_scale: vec![0.0; ld],
-            weight: vec![0.0; n + 1],
+            ld,
+            lower: vec![0.0; m * ld],
+            upper: vec![0.0; m * ld],
+            inverse_pivot: vec![0.0; m.min(n)],
+            weight: vec![0.0; ld],
+            alive: vec![0.0; ld],
+            place_bits: (0..ld as u64).collect(),
             pivots: Vec::with_capacity(m.min(n)),
-            live: Vec::with_capacity(n + 1),
-            next_row: vec![0.0; n + 1],
-            factors: vec![0.0; n + 1],
+            remaining: Vec::with_capacity(n),
+            kept_places: Vec::with_capacity(ld),
+            rows: Vec::with_capacity(m),
+            row_scale: vec![0.0; m],
+            zeros: vec![0.0; m],
+            solution: vec![0.0; m.max(1) * ld],
         }
     }
 
@@ -105,64 +135,62 @@ impl Elimination {
         self.pivots.len()
     }
 
-    /// Columns not eliminated: N.
-    pub(super) fn remaining(&self) -> &[usize] {
-        &self.live[1..]
-    }
-
-    /// Eliminates the rows of `qp`.
-    pub(super) fn run(&mut self, qp: &Qp<'_>) -> Rows {
+    /// Eliminates the rows of `qp`, leaving out those whose remainder is below `dependent` (see [`DEPENDENT`]).
+    pub(super) fn run(&mut self, qp: &Qp<'_>, dependent: f64) -> Rows {
+        self.dependent = dependent;
         self.load(qp);
         if !self.row_scale[..self.m].iter().zip(qp.b).all(|(scale, b)| (scale + b.abs()).is_finite()) {
             return Rows::NotFinite;
         }
         self.factorise();
+        self.remaining.extend((0..self.n).filter(|j| self.alive[j + 1] > 0.0));
         if self.dependent_rows_hold(qp.b) { Rows::Consistent } else { Rows::Contradictory }
     }
 
     fn load(&mut self, qp: &Qp<'_>) {
-        (self.m, self.n, self.ld) = (qp.equalities(), qp.unknowns(), padded(qp.equalities()));
+        (self.m, self.n, self.ld) = (qp.equalities(), qp.unknowns(), padded(qp.unknowns() + 1));
         self.pivots.clear();
-        self.live.clear();
-        self.live.push(self.n);
-        self.live.extend(0..self.n);
+        self.remaining.clear();
         self.rows.clear();
         self.rows.extend(0..self.m);
-        for ((weight, lo), hi) in self.weight.iter_mut().zip(qp.lo).zip(qp.hi) {
-            let is_free = *lo == f64::NEG_INFINITY && *hi == f64::INFINITY;
-            *weight = if is_free { 1.0 } else { BOUNDED_WEIGHT };
-        }
-        self.weight[self.n] = 0.0;
+        self.alive.fill(1.0);
         if self.m > 0 {
+            self.weight.fill(0.0);
+            for ((weight, lo), hi) in self.weight[1..].iter_mut().zip(qp.lo).zip(qp.hi) {
+                let is_free = *lo == f64::NEG_INFINITY && *hi == f64::INFINITY;
+                *weight = if is_free { 1.0 } else { BOUNDED_WEIGHT };
+            }
             self.load_rows(&qp.a, qp.b);
         }
     }
 
+    /// Transposes [b A] into `lower`, four columns at a time.
     fn load_rows(&mut self, a: &MatRef<'_>, b: &[f64]) {
-        let ld = self.ld;
-        for (j, column) in self.store.chunks_exact_mut(2 * ld).take(self.n).enumerate() {
-            copy_padded(a.col(j), &mut column[ld..]);
-        }
-        copy_padded(b, &mut self.store[(2 * self.n + 1) * ld..][..ld]);
-        for (block, scale) in self.row_scale[..ld].as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
-            let mut sums = [0.0; LANES];
-            for column in self.store.chunks_exact(2 * ld).take(self.n) {
-                let [entries] = group_of::<1>(&column[ld + block * LANES..]);
-                for lane in 0..LANES {
-                    sums[lane] += entries[lane].abs();
-                }
+        let (n, m, ld) = (self.n, self.m, self.ld);
+        let column = |place: usize| match place {
+            0 => &b[..m],
+            place if place <= n => &a.col(place - 1)[..m],
+            _ => &self.zeros[..m],
+        };
+        for first in (0..ld).step_by(LANES) {
+            let [c0, c1, c2, c3] = std::array::from_fn(|lane| column(first + lane));
+            let entries = c0.iter().zip(c1).zip(c2).zip(c3);
+            for (r, (((e0, e1), e2), e3)) in entries.enumerate() {
+                self.lower[r * ld + first..][..LANES].copy_from_slice(&[*e0, *e1, *e2, *e3]);
             }
-            *scale = sums;
+        }
+        for (scale, row) in self.row_scale.iter_mut().zip(self.lower.chunks_exact(ld)).take(m) {
+            *scale = sum_abs(row) - row[0].abs();
         }
     }
 
     fn factorise(&mut self) {
         let (mut row, mut end) = (0, self.m);
-        let mut key = self.best_in_row(row);
+        let mut key = if end > 0 { self.best_in_row(0) } else { 0 };
         while row < end {
-            let slot = (key & INDEX_MASK) as usize;
-            if self.is_above(POSTPONED, row, slot) {
-                key = self.eliminate(row, slot);
+            let place = (key & INDEX_MASK) as usize;
+            if self.is_above(POSTPONED, row, place) {
+                key = self.eliminate(row, place);
                 row += 1;
             } else {
                 end -= 1;
@@ -170,48 +198,47 @@ impl Elimination {
                 key = self.best_in_row(row);
             }
         }
-        while let Some((pivot_row, slot)) = self.best_of_rows_from(row) {
+        while let Some((pivot_row, place)) = self.best_of_rows_from(row) {
             self.swap_rows(row, pivot_row);
-            self.best_in_row(row);
-            self.eliminate(row, slot);
+            self.eliminate(row, place);
             row += 1;
         }
     }
 
-    /// Entry of `row` in the live column number `slot`.
-    fn entry(&self, row: usize, slot: usize) -> f64 {
-        self.store[(2 * self.live[slot] + 1) * self.ld + row]
+    /// True if `place` holds a live unknown with an entry above `fraction` of the row.
+    ///
+    /// The key of a row of zeros may name any place.
+    fn is_above(&self, fraction: f64, row: usize, place: usize) -> bool {
+        self.weight[place] > 0.0 && self.lower[row * self.ld + place].abs() > fraction * self.row_scale[row]
     }
 
-    /// True if `slot` is an unknown with an entry above `fraction` of the row; slot 0 is the right-hand side.
-    fn is_above(&self, fraction: f64, row: usize, slot: usize) -> bool {
-        slot > 0 && self.entry(row, slot).abs() > fraction * self.row_scale[row]
-    }
-
-    /// Reads `row` into `next_row`; returns the key of its best pivot: weighted magnitude with its last bits
-    /// replaced by the slot.
-    fn best_in_row(&mut self, row: usize) -> u64 {
-        let mut key = 0;
-        if row < self.m {
-            for (slot, &column) in self.live.iter().enumerate() {
-                let value = self.store[(2 * column + 1) * self.ld + row];
-                self.next_row[slot] = value;
-                key = key.max(pivot_key(value * self.weight[column], slot));
+    /// Key of the best pivot of a row: weighted magnitude with its last bits replaced by the place.
+    #[inline]
+    fn best_in_row(&self, row: usize) -> u64 {
+        let row = &self.lower[row * self.ld..][..self.ld];
+        let mut best = [0.0; LANES];
+        let blocks = row.as_chunks::<LANES>().0.iter().zip(self.weight.as_chunks::<LANES>().0);
+        for ((row, weight), places) in blocks.zip(self.place_bits.as_chunks::<LANES>().0) {
+            for lane in 0..LANES {
+                // Magnitudes order like their bits, so the key can stay a float and be compared as one.
+                let bits = (row[lane] * weight[lane]).to_bits() & MAGNITUDE_MASK;
+                let key = f64::from_bits(bits | places[lane]);
+                best[lane] = larger(best[lane], key);
             }
         }
-        key
+        larger(larger(best[0], best[1]), larger(best[2], best[3])).to_bits()
     }
 
-    /// Independent row and slot with the largest remaining entry relative to its row, from `first` on.
+    /// Independent row and place with the largest live entry relative to its row, from `first` on.
     fn best_of_rows_from(&self, first: usize) -> Option<(usize, usize)> {
         let mut best = None;
         let mut largest = 0.0;
         for row in first..self.m {
-            for slot in 1..self.live.len() {
-                let relative = self.entry(row, slot).abs() / self.row_scale[row];
-                if relative > largest && self.is_above(DEPENDENT, row, slot) {
+            for place in 1..=self.n {
+                let relative = self.lower[row * self.ld + place].abs() / self.row_scale[row];
+                if relative > largest && self.is_above(self.dependent, row, place) {
                     largest = relative;
-                    best = Some((row, slot));
+                    best = Some((row, place));
                 }
             }
         }
@@ -219,67 +246,54 @@ impl Elimination {
     }
 
     fn swap_rows(&mut self, i: usize, j: usize) {
-        if i == j {
-            return;
-        }
-        self.rows.swap(i, j);
-        self.row_scale.swap(i, j);
-        for column in self.store.chunks_exact_mut(2 * self.ld).take(self.n + 1) {
-            column.swap(self.ld + i, self.ld + j);
+        if i < j {
+            self.rows.swap(i, j);
+            self.row_scale.swap(i, j);
+            let (head, tail) = self.lower.split_at_mut(j * self.ld);
+            head[i * self.ld..][..self.ld].swap_with_slice(&mut tail[..self.ld]);
         }
     }
 
-    /// Eliminates `row`, whose entries are in `next_row`, with the live column `slot` as pivot; returns the
-    /// pivot key of the row after it.
+    /// Eliminates `row` with the pivot at `place`; returns the pivot key of the row after it.
     ///
-    /// Optimisation: the entries of the row after it are computed first and on their own, so that the search
-    /// for its pivot and the division need not wait for the update of the whole matrix.
-    fn eliminate(&mut self, row: usize, slot: usize) -> u64 {
-        let (ld, stride) = (self.ld, 2 * self.ld);
-        let inverse = 1.0 / self.next_row[slot];
-        let last = self.live.len() - 1;
-        self.next_row.swap(slot, last);
-        let column = self.live.swap_remove(slot);
-        self.pivots.push(column);
-        self.store[column * stride..][row..padded(row)].fill(0.0);
-
-        let next = (row + 1).min(self.m - 1);
-        let pivot_next = self.store[column * stride + ld + next];
-        let key = {
-            let (store, weight) = (self.store.as_mut_slice(), self.weight.as_slice());
-            let mut key = 0;
-            let slots = self.live.iter().zip(&mut self.next_row).zip(&mut self.factors);
-            for (slot, ((&column, entry), out)) in slots.enumerate() {
-                let entries = &mut store[column * stride..][..stride];
-                let factor = *entry * inverse;
-                *out = factor;
-                entries[row] = factor;
-                let value = entries[ld + next] - factor * pivot_next;
-                *entry = value;
-                key = key.max(pivot_key(value * weight[column], slot));
-            }
-            key
-        };
-
-        let first = (row + 1) / LANES * LANES;
-        for start in (first..ld).step_by(GROUP * LANES) {
-            match (ld - start) / LANES {
-                1 => self.subtract_pivot::<1>(column, start),
-                2 => self.subtract_pivot::<2>(column, start),
-                3 => self.subtract_pivot::<3>(column, start),
-                _ => self.subtract_pivot::<GROUP>(column, start),
-            }
+    /// Optimisation: the row after it is updated first, so that the search for its pivot and the division
+    /// overlap with the update of the others.
+    fn eliminate(&mut self, row: usize, place: usize) -> u64 {
+        let (ld, m) = (self.ld, self.m);
+        self.pivots.push(place - 1);
+        self.alive[place] = 0.0;
+        self.weight[place] = 0.0;
+        let pivot_row = &self.lower[row * ld..][..ld];
+        let inverse = 1.0 / pivot_row[place];
+        self.inverse_pivot[row] = inverse;
+        let upper = &mut self.upper[row * ld..][..ld];
+        for ((upper, entry), alive) in upper.iter_mut().zip(pivot_row).zip(&self.alive) {
+            *upper = entry * (inverse * alive);
         }
+        if row + 1 == m {
+            return 0;
+        }
+        self.subtract_upper_row(row, row + 1..row + 2, place);
+        let key = self.best_in_row(row + 1);
+        self.subtract_upper_row(row, row + 2..m, place);
         key
     }
 
-    /// Subtracts multiples of column `pivot` from all live columns in `BLOCKS` blocks of rows from `start`.
-    fn subtract_pivot<const BLOCKS: usize>(&mut self, pivot: usize, start: usize) {
-        let offset = self.ld + start;
-        let stride = 2 * self.ld;
-        let pivot = group_of::<BLOCKS>(&self.store[pivot * stride + offset..]);
-        for (&column, factor) in self.live.iter().zip(&self.factors) {
-            subtract_scaled_group(&mut self.store[column * stride + offset..], *factor, &pivot);
+    /// Subtracts row `row` of U, times their entry at `place`, from `rows`.
+    #[inline]
+    fn subtract_upper_row(&mut self, row: usize, rows: Range<usize>, place: usize) {
+        let ld = self.ld;
+        let upper = &self.upper[row * ld..][..ld];
+        for start in (0..ld).step_by(GROUP * LANES) {
+            let upper = &upper[start..];
+            let rows = rows.clone().map(|row| row * ld);
+            match upper.len() / LANES {
+                1 => subtract_from_rows::<1>(&mut self.lower, rows, start, place, upper),
+                2 => subtract_from_rows::<2>(&mut self.lower, rows, start, place, upper),
+                3 => subtract_from_rows::<3>(&mut self.lower, rows, start, place, upper),
+                4 => subtract_from_rows::<4>(&mut self.lower, rows, start, place, upper),
+                _ => subtract_from_rows::<GROUP>(&mut self.lower, rows, start, place, upper),
+            }
         }
     }
 
@@ -288,80 +302,113 @@ impl Elimination {
     /// The reduced right-hand side of such a row is its residual at x_N = 0, known to rounding of the terms
     /// of the row at that point: |b_i| + sum_s |L_is| |u_s|.
     fn dependent_rows_hold(&self, b: &[f64]) -> bool {
-        let (upper, lower) = if self.m == 0 { return true } else { self.column(self.n) };
         (self.rank()..self.m).all(|row| {
-            let eliminated = self.pivots.iter().enumerate().map(|(s, &p)| self.column(p).1[row] * upper[s]);
-            let terms: f64 = eliminated.map(f64::abs).sum();
-            lower[row].abs() <= CONSISTENT * (terms + b[self.rows[row]].abs())
+            let lower = &self.lower[row * self.ld..][..self.ld];
+            let pivots = self.pivots.iter().enumerate();
+            let eliminated: f64 = pivots.map(|(s, p)| (lower[p + 1] * self.upper[s * self.ld]).abs()).sum();
+            let terms = CONSISTENT * (eliminated + b[self.rows[row]].abs());
+            lower[0].abs() <= terms.max(SHARE * self.dependent * self.row_scale[row])
         })
     }
 
-    /// Upper and lower run of a column; column n is the right-hand side.
-    fn column(&self, j: usize) -> (&[f64], &[f64]) {
-        self.store[j * 2 * self.ld..][..2 * self.ld].split_at(self.ld)
-    }
-
     /// Writes T (one column of `stride` per remaining unknown, in that order) and then c, so that
-    /// x_B = c + T x_N. Entries from the rank to the next whole block are zero.
-    ///
-    /// `stride` is a whole number of blocks and at least the rank.
-    pub(super) fn solution_into(&self, stride: usize, t_and_c: &mut [f64]) {
-        let (k, rank) = (self.remaining().len(), self.rank());
-        let columns = &mut t_and_c[..stride * (k + 1)];
-        if rank == 0 {
-            columns.fill(0.0);
-            return;
-        }
-        for (slot, out) in columns.chunks_exact_mut(stride).enumerate() {
-            let (source, sign) = if slot < k { (self.remaining()[slot], -1.0) } else { (self.n, 1.0) };
-            let upper = &self.column(source).0[..rank];
-            for (out, value) in out.iter_mut().zip(upper) {
-                *out = sign * value;
-            }
-            out[rank..].fill(0.0);
-        }
-        for s in (1..rank).rev() {
-            let upper = &self.column(self.pivots[s]).0[..padded(s)];
-            for start in (0..upper.len()).step_by(GROUP * LANES) {
-                match (upper.len() - start) / LANES {
-                    1 => substitute::<1>(columns, stride, s, start, upper),
-                    2 => substitute::<2>(columns, stride, s, start, upper),
-                    3 => substitute::<3>(columns, stride, s, start, upper),
-                    _ => substitute::<GROUP>(columns, stride, s, start, upper),
+    /// x_B = c + T x_N. Entries from the rank to the stride are zero.
+    pub(super) fn solution_into(&mut self, stride: usize, t_and_c: &mut [f64]) {
+        let (k, rank) = (self.remaining.len(), self.rank());
+        let width = padded(k + 1);
+        self.kept_places.clear();
+        self.kept_places.push(0);
+        self.kept_places.extend(self.remaining.iter().map(|unknown| unknown + 1));
+        self.kept_places.resize(width, 0);
+        for row in (0..rank).rev() {
+            for start in (0..width).step_by(GROUP * LANES) {
+                match (width - start) / LANES {
+                    1 => self.substitute::<1>(row, width, start),
+                    2 => self.substitute::<2>(row, width, start),
+                    3 => self.substitute::<3>(row, width, start),
+                    4 => self.substitute::<4>(row, width, start),
+                    _ => self.substitute::<GROUP>(row, width, start),
                 }
             }
         }
+        let columns = &mut t_and_c[..stride * (k + 1)];
+        for (place, column) in columns.chunks_exact_mut(stride).enumerate() {
+            let (source, sign) = if place < k { (place + 1, -1.0) } else { (0, 1.0) };
+            for (row, out) in column[..rank].iter_mut().enumerate() {
+                *out = sign * self.solution[row * width + source];
+            }
+            column[rank..].fill(0.0);
+        }
+    }
+
+    /// Row `row` of the solution, `BLOCKS` blocks from `start`: its row of U less the rows below, which are
+    /// known, times their entry of U. The newest row comes last.
+    #[inline]
+    fn substitute<const BLOCKS: usize>(&mut self, row: usize, width: usize, start: usize) {
+        let upper = &self.upper[row * self.ld..][..self.ld];
+        let places = &self.kept_places[start..][..BLOCKS * LANES];
+        let mut sums: [[f64; LANES]; BLOCKS] =
+            std::array::from_fn(|block| std::array::from_fn(|lane| upper[places[block * LANES + lane]]));
+        for known in (row + 1..self.rank()).rev() {
+            let factor = upper[self.pivots[known] + 1];
+            let known = &self.solution[known * width + start..];
+            subtract_scaled_group::<BLOCKS>(sums.as_flattened_mut(), factor, known);
+        }
+        self.solution[row * width + start..][..BLOCKS * LANES].copy_from_slice(sums.as_flattened());
     }
 
     /// Solves A_Bᵀ y = q for the multipliers of the eliminated rows; redundant rows get 0.
     ///
-    /// `q` (length rank, in the order of the pivots) is destroyed.
-    pub(super) fn multipliers_into(&mut self, q: &mut [f64], y: &mut [f64]) {
+    /// `q` has the length of the rank and the order of the pivots.
+    pub(super) fn multipliers_into(&mut self, q: &[f64], y: &mut [f64]) {
         y.fill(0.0);
-        let rank = self.rank();
-        for s in 1..rank {
-            let upper = &self.column(self.pivots[s]).0[..s];
-            q[s] -= dot(upper, &q[..s]);
+        let ld = self.ld;
+        // Only the places of pivots matter; the others collect what is never read.
+        let by_place = &mut self.solution[..ld];
+        by_place.fill(0.0);
+        for (pivot, value) in self.pivots.iter().zip(q) {
+            by_place[pivot + 1] = *value;
         }
-        for s in (0..rank).rev() {
-            let lower = self.column(self.pivots[s]).1;
-            q[s] = (q[s] - dot(&lower[s + 1..rank], &q[s + 1..rank])) / lower[s];
-            y[self.rows[s]] = q[s];
+        for (s, pivot) in self.pivots.iter().enumerate() {
+            let value = by_place[pivot + 1];
+            subtract_scaled_blocks(by_place, value, &self.upper[s * ld..][..ld]);
+        }
+        for (s, pivot) in self.pivots.iter().enumerate().rev() {
+            let value = by_place[pivot + 1] * self.inverse_pivot[s];
+            y[self.rows[s]] = value;
+            subtract_scaled_blocks(by_place, value, &self.lower[s * ld..][..ld]);
         }
     }
 }
 
-/// Orders candidates by magnitude; the slot in the last bits makes ties deterministic.
-#[inline]
-fn pivot_key(value: f64, slot: usize) -> u64 {
-    (value.abs().to_bits() & !INDEX_MASK) | slot as u64
+/// Subtracts `BLOCKS` blocks of a row of U, times their entry at `place`, from rows of `lower` at `start`.
+#[inline(always)]
+fn subtract_from_rows<const BLOCKS: usize>(
+    lower: &mut [f64],
+    row_offsets: impl Iterator<Item = usize>,
+    start: usize,
+    place: usize,
+    upper: &[f64],
+) {
+    for offset in row_offsets {
+        let factor = lower[offset + place];
+        subtract_scaled_group::<BLOCKS>(&mut lower[offset + start..], factor, upper);
+    }
 }
 
-/// Substitutes unknown `s`, final in each of `columns`, into `BLOCKS` blocks of rows above it.
-fn substitute<const BLOCKS: usize>(columns: &mut [f64], stride: usize, s: usize, start: usize, upper: &[f64]) {
-    let upper = group_of::<BLOCKS>(&upper[start..]);
-    for column in columns.chunks_exact_mut(stride) {
-        let value = column[s];
-        subtract_scaled_group(&mut column[start..], value, &upper);
+/// Maximum as the one instruction it is; `f64::max` also orders NaN.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// Sum of magnitudes of whole blocks.
+fn sum_abs(x: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    for block in x.as_chunks::<LANES>().0 {
+        for lane in 0..LANES {
+            sums[lane] += block[lane].abs();
+        }
     }
+    sums.iter().sum()
 }

@@ -12,36 +12,37 @@ pub(super) fn padded(len: usize) -> usize {
     len.next_multiple_of(LANES)
 }
 
-/// Blocks of one column that are kept in registers while they are subtracted from others.
-pub(super) const GROUP: usize = 4;
+/// Blocks handled at a time by the unrolled kernels.
+pub(super) const GROUP: usize = 5;
 
-/// y -= a x for a fixed number of blocks; fully unrolled.
-#[inline(always)]
-pub(super) fn subtract_scaled_group<const BLOCKS: usize>(y: &mut [f64], a: f64, x: &[[f64; LANES]; BLOCKS]) {
-    for (y, x) in y[..BLOCKS * LANES].as_chunks_mut::<LANES>().0.iter_mut().zip(x) {
-        for lane in 0..LANES {
-            y[lane] -= a * x[lane];
+/// y -= a x over whole blocks; `x` is at least as long as `y`.
+///
+/// Optimisation: unrolled for up to [`GROUP`] blocks. Left to itself the compiler interleaves blocks with
+/// shuffles that cost more than the arithmetic.
+#[inline]
+pub(super) fn subtract_scaled_blocks(y: &mut [f64], a: f64, x: &[f64]) {
+    for start in (0..y.len()).step_by(GROUP * LANES) {
+        let (y, x) = (&mut y[start..], &x[start..]);
+        match y.len() / LANES {
+            0 => {}
+            1 => subtract_scaled_group::<1>(y, a, x),
+            2 => subtract_scaled_group::<2>(y, a, x),
+            3 => subtract_scaled_group::<3>(y, a, x),
+            4 => subtract_scaled_group::<4>(y, a, x),
+            _ => subtract_scaled_group::<GROUP>(y, a, x),
         }
     }
 }
 
-/// The first `BLOCKS` blocks of x.
+/// y -= a x for a fixed number of blocks; fully unrolled.
 #[inline(always)]
-pub(super) fn group_of<const BLOCKS: usize>(x: &[f64]) -> [[f64; LANES]; BLOCKS] {
-    std::array::from_fn(|block| std::array::from_fn(|lane| x[block * LANES + lane]))
-}
-
-/// Copies `source` and fills the rest of `out` with zeros; `out` is a whole number of blocks.
-#[inline]
-pub(super) fn copy_padded(source: &[f64], out: &mut [f64]) {
-    let (blocks, rest) = source.as_chunks::<LANES>();
-    let (out_blocks, _) = out.as_chunks_mut::<LANES>();
-    for (out, block) in out_blocks.iter_mut().zip(blocks) {
-        *out = *block;
-    }
-    for (index, out) in out_blocks.iter_mut().enumerate().skip(blocks.len()) {
-        let first = (index - blocks.len()) * LANES;
-        *out = std::array::from_fn(|lane| rest.get(first + lane).copied().unwrap_or(0.0));
+pub(super) fn subtract_scaled_group<const BLOCKS: usize>(y: &mut [f64], a: f64, x: &[f64]) {
+    let x = &x[..BLOCKS * LANES];
+    let y = &mut y[..BLOCKS * LANES];
+    for block in 0..BLOCKS {
+        for lane in block * LANES..(block + 1) * LANES {
+            y[lane] -= a * x[lane];
+        }
     }
 }
 

@@ -22,7 +22,8 @@ use super::{MatRef, Qp, QpSolution, QpSolver, QpStatus};
 /// and the reduced Hessian of (1) has entries of order (1 / 4)² to 4².
 const SLACK_SCALE: f64 = 1e-3;
 
-/// Residual, relative to the terms of the rows, that is rounding: the rows did fit.
+/// Residual, relative to the terms of the rows (at least 1: rows in metres and radians), that is rounding: the rows did
+/// fit.
 const NEGLIGIBLE: f64 = 1e-12;
 
 /// Widening of the box, relative to the point (at most 1), for the second try at (2). The widened part is
@@ -119,7 +120,7 @@ impl<S: QpSolver> Lexicographic<S> {
         }
         out.minors += tried + self.fitted.minors;
         let (residual, terms) = self.residual(qp, &out.x);
-        if improved && residual <= NEGLIGIBLE * terms { Outcome::Solved } else { Outcome::Relaxed { residual } }
+        if improved && residual <= NEGLIGIBLE * terms.max(1.0) { Outcome::Solved } else { Outcome::Relaxed { residual } }
     }
 
     /// Problem (1); leaves x₁ (and slacks) in `self.fitted` and A x₁ in `self.reached`.

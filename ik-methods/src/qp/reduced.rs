@@ -82,14 +82,14 @@ impl Reduced {
     }
 
     /// Takes over T and c.
-    pub(super) fn load(&mut self, elimination: &Elimination) {
+    pub(super) fn load(&mut self, elimination: &mut Elimination) {
         self.rank = elimination.rank();
-        self.k = elimination.remaining().len();
+        self.k = elimination.remaining.len();
         self.n = self.rank + self.k;
         self.stride = padded(self.rank).max(LANES);
         self.order.clear();
         self.order.extend_from_slice(&elimination.pivots);
-        self.order.extend_from_slice(elimination.remaining());
+        self.order.extend_from_slice(&elimination.remaining);
         elimination.solution_into(self.stride, &mut self.t_and_c);
     }
 
@@ -229,6 +229,15 @@ impl Reduced {
         let rank = eliminated.len();
         for (value, t) in v.iter().zip(self.t_and_c.chunks_exact(self.stride)) {
             add_scaled(eliminated, *value, &t[..rank]);
+        }
+    }
+
+    /// Gradient H x + g in the order of the problem for x in positions, from H Z and H x_c + g.
+    pub(super) fn gradient_into(&self, x: &[f64], gradient: &mut [f64]) {
+        let (n, k) = (self.n, self.k);
+        gradient.copy_from_slice(&self.hz[k * n..][..n]);
+        for (a, value) in x[self.rank..][..k].iter().enumerate() {
+            add_scaled(gradient, *value, &self.hz[a * n..][..n]);
         }
     }
 
