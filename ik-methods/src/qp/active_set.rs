@@ -58,8 +58,8 @@ pub struct ActiveSet {
 impl ActiveSet {
     /// Solver for problems of up to `n` unknowns and `m_max` equality rows.
     ///
-    /// A larger problem is solved as well, after allocating again. More than 4096 unknowns are not
-    /// supported (`Numerical`).
+    /// A larger problem is solved as well, after allocating again. Problems of no or more than
+    /// 4095 unknowns are refused (`Numerical`).
     #[must_use]
     pub fn new(n: usize, m_max: usize) -> Self {
         Self {
@@ -240,9 +240,9 @@ impl QpSolver for ActiveSet {
     }
 }
 
-/// Shape and box; `Solved` means nothing is wrong with them.
+/// Size, shape and box; `Solved` means nothing is wrong with them.
 pub(super) fn check_input(qp: &Qp<'_>) -> QpStatus {
-    if !qp.is_consistent_in_shape() || qp.unknowns() > MAX_UNKNOWNS {
+    if !qp.is_consistent_in_shape() || !(1..=MAX_UNKNOWNS).contains(&qp.unknowns()) {
         return QpStatus::Numerical;
     }
     let mut status = QpStatus::Solved;

@@ -22,6 +22,12 @@ use super::{MatRef, Qp, QpSolution, QpSolver, QpStatus};
 /// and the reduced Hessian of (1) has entries of order (1 / 4)² to 4².
 const SLACK_SCALE: f64 = 1e-3;
 
+/// Weight of the motion itself in (1), against 1 for a slack.
+///
+/// It makes (1) strictly convex, so that nearly dependent rows cannot send x along a direction no row sees; a residual
+/// grows by at most this times SLACK_SCALE² = 1e-12 of |x| over the least relevant singular value.
+const MOTION_WEIGHT: f64 = 1e-6;
+
 /// Residual, relative to the terms of the rows (at least 1: rows in metres and radians), that is rounding: the rows did
 /// fit.
 const NEGLIGIBLE: f64 = 1e-12;
@@ -157,6 +163,7 @@ impl<S: QpSolver> Lexicographic<S> {
             largest = largest.max(max_abs(qp.a.col(j)));
         }
         let scale = if largest > 0.0 { SLACK_SCALE * largest } else { 1.0 };
+        self.hessian.iter_mut().step_by(wide + 1).take(n).for_each(|h| *h = MOTION_WEIGHT);
         for r in 0..m {
             self.rows[(n + r) * m + r] = scale;
             self.hessian[(n + r) * (wide + 1)] = 1.0;
