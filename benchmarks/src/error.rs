@@ -57,7 +57,7 @@ pub enum InputError {
         /// File, suite or command.
         place: String,
         /// What is wrong with it.
-        source: RobotError,
+        source: Box<RobotError>,
     },
     /// A problem that contradicts itself.
     #[error("{place}: {source}")]
@@ -131,7 +131,9 @@ fn did_you_mean(found: &str, known: &[String]) -> String {
     let nearest = known.iter().map(|k| (edit_distance(found, k), k)).min();
     match nearest {
         // One slip in three letters is a typing error, more is another word.
-        Some((distance, name)) if 3 * distance <= found.chars().count() => format!(", did you mean `{name}`?"),
+        Some((distance, name)) if 3 * distance <= found.chars().count() => {
+            format!(", did you mean `{name}`?")
+        }
         _ => String::new(),
     }
 }
@@ -167,8 +169,16 @@ mod tests {
     #[test]
     fn a_near_name_is_suggested_and_a_far_one_is_not() {
         let message = |found| InputError::unknown("suite x", "task", found, ["com", "torso"]).to_string();
-        assert!(message("torsi").contains("did you mean `torso`?"), "{}", message("torsi"));
-        assert!(!message("gripper").contains("did you mean"), "{}", message("gripper"));
+        assert!(
+            message("torsi").contains("did you mean `torso`?"),
+            "{}",
+            message("torsi")
+        );
+        assert!(
+            !message("gripper").contains("did you mean"),
+            "{}",
+            message("gripper")
+        );
         assert!(message("gripper").contains("com, torso"));
     }
 }

@@ -126,12 +126,18 @@ impl Instance {
         let robot = case.problem.robot();
         let v_prev = match k {
             1 => vec![0.0; robot.nv()],
-            _ => difference(robot, &played.q[k - 2], &played.q[k - 1]).iter().map(|d| d / case.dt_s).collect(),
+            _ => difference(robot, &played.q[k - 2], &played.q[k - 1])
+                .iter()
+                .map(|d| d / case.dt_s)
+                .collect(),
         };
         let width = case.problem.nx() + case.problem.nxdot();
         let samples = case.samples.seen(k).chunks_exact(width).map(|sample| {
             let (x, xdot) = sample.split_at(case.problem.nx());
-            TargetSample { x: x.to_vec(), xdot: xdot.to_vec() }
+            TargetSample {
+                x: x.to_vec(),
+                xdot: xdot.to_vec(),
+            }
         });
         Self {
             schema: SCHEMA.to_owned(),
@@ -154,7 +160,10 @@ impl Instance {
     /// # Errors
     /// Text that is no instance, with line and column.
     pub fn parse(text: &str, source: &str) -> Result<Self, InputError> {
-        let syntax = |e: serde_json::Error| InputError::Syntax { file: source.to_owned(), reason: e.to_string() };
+        let syntax = |e: serde_json::Error| InputError::Syntax {
+            file: source.to_owned(),
+            reason: e.to_string(),
+        };
         let instance: Self = serde_json::from_str(text).map_err(syntax)?;
         if instance.schema != SCHEMA {
             return Err(InputError::value(source, "schema", &instance.schema, SCHEMA));
@@ -166,14 +175,21 @@ impl Instance {
     ///
     /// # Errors
     /// An unknown method or parameter, a value out of range.
-    pub fn contestant(&self, method: Option<&str>, set: &toml::Table, source: &str) -> Result<Contestant, InputError> {
+    pub fn contestant(
+        &self,
+        method: Option<&str>,
+        set: &toml::Table,
+        source: &str,
+    ) -> Result<Contestant, InputError> {
         let own = method.is_none_or(|id| id == self.method);
         let place = if method.is_some() { "--method" } else { source };
         let entry = known_method(method.unwrap_or(&self.method), place)?;
         let mut parameters = toml::Table::new();
         for (key, value) in self.parameters.iter().filter(|_| own) {
             let value = toml::Value::try_from(value);
-            let value = value.map_err(|e| InputError::value(source, &format!("parameters.{key}"), e, "a number or a word"))?;
+            let value = value.map_err(|e| {
+                InputError::value(source, &format!("parameters.{key}"), e, "a number or a word")
+            })?;
             parameters.insert(key.clone(), value);
         }
         parameters.extend(set.iter().map(|(k, v)| (k.clone(), v.clone())));
@@ -187,14 +203,28 @@ impl Instance {
     pub fn solve(&self, contestant: &Contestant, source: &str) -> Result<Answer, InputError> {
         let problem = self.problem.build(&format!("{source}: problem"))?;
         let data = self.targets(&problem, source)?;
-        let mut driver = Driver::new(contestant.formulation.as_ref(), &problem)
-            .map_err(|e| InputError::Declined { method: contestant.id.clone(), source: e })?;
+        let mut driver =
+            Driver::new(contestant.formulation.as_ref(), &problem).map_err(|e| InputError::Declined {
+                method: contestant.id.clone(),
+                source: e,
+            })?;
         let targets = Window::new(&data, problem.nx(), problem.nxdot());
-        let targets = targets.map_err(|_| InputError::value(source, "samples", self.samples.len(), "at least 2"))?;
+        let targets =
+            targets.map_err(|_| InputError::value(source, "samples", self.samples.len(), "at least 2"))?;
         let phase = PhaseId(self.phase);
         let (q_prev, v_prev) = (&self.q_prev[..], &self.v_prev[..]);
-        let input = StepInput { q_prev, v_prev, dt_s: self.dt_s, phase, targets, gains: &self.gains };
-        driver.check(&input).map_err(|e| InputError::Syntax { file: source.to_owned(), reason: e.to_string() })?;
+        let input = StepInput {
+            q_prev,
+            v_prev,
+            dt_s: self.dt_s,
+            phase,
+            targets,
+            gains: &self.gains,
+        };
+        driver.check(&input).map_err(|e| InputError::Syntax {
+            file: source.to_owned(),
+            reason: e.to_string(),
+        })?;
         let own = contestant.id == self.method && recorded(&contestant.parameters) == self.parameters;
         let majors = if own { self.majors } else { driver.majors() };
         let (termination, counts) = driver.step(&input, majors);
@@ -220,11 +250,19 @@ impl Instance {
     fn targets(&self, problem: &Problem, source: &str) -> Result<Vec<f64>, InputError> {
         let mut data = Vec::new();
         for (i, sample) in self.samples.iter().enumerate() {
-            for (field, values, needed) in [("x", &sample.x, problem.nx()), ("xdot", &sample.xdot, problem.nxdot())] {
+            for (field, values, needed) in [
+                ("x", &sample.x, problem.nx()),
+                ("xdot", &sample.xdot, problem.nxdot()),
+            ] {
                 let field = format!("samples[{i}].{field}");
                 if values.len() != needed {
                     let found = format!("{} numbers", values.len());
-                    return Err(InputError::value(source, &field, found, &format!("{needed} numbers")));
+                    return Err(InputError::value(
+                        source,
+                        &field,
+                        found,
+                        &format!("{needed} numbers"),
+                    ));
                 }
                 data.extend(values);
             }
@@ -235,7 +273,9 @@ impl Instance {
 
 fn detail(termination: &Termination) -> String {
     match termination {
-        Termination::HardRowsRelaxed { residual } => format!("linearised hard rows miss by {residual:e} (m, rad)"),
+        Termination::HardRowsRelaxed { residual } => {
+            format!("linearised hard rows miss by {residual:e} (m, rad)")
+        }
         Termination::OutOfReach { missing_m } => format!("the target is {missing_m} m out of reach"),
         Termination::Numerical(reason) => (*reason).to_owned(),
         Termination::Failed(failure) => format!("{failure:?}"),
@@ -256,7 +296,11 @@ fn active_bounds(driver: &Driver, q_prev: &[f64]) -> Vec<ActiveBound> {
             (false, true) => "upper",
             (false, false) => continue,
         };
-        active.push(ActiveBound { joint: coordinate.name.clone(), side, increment: increment[v] });
+        active.push(ActiveBound {
+            joint: coordinate.name.clone(),
+            side,
+            increment: increment[v],
+        });
     }
     active
 }
@@ -272,8 +316,17 @@ fn residuals(problem: &Problem, phase: PhaseId, q: &[f64], target: &[f64]) -> Ve
                 Priority::Hard => "hard",
                 Priority::Compromised(_) => "compromised",
             };
-            let error = task_error(problem, &task.track, &values[slot.xdot..slot.xdot + rows], &target[slot.x..]);
-            Residual { task: task.name.clone(), priority, error }
+            let error = task_error(
+                problem,
+                &task.track,
+                &values[slot.xdot..slot.xdot + rows],
+                &target[slot.x..],
+            );
+            Residual {
+                task: task.name.clone(),
+                priority,
+                error,
+            }
         })
         .collect()
 }

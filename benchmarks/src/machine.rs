@@ -27,7 +27,9 @@ fn processor() -> Option<String> {
 
 /// Revision of the source tree this program was built in, as git tells it now.
 pub fn revision() -> String {
-    let Some(commit) = git(&["rev-parse", "--short=12", "HEAD"]) else { return UNKNOWN.to_owned() };
+    let Some(commit) = git(&["rev-parse", "--short=12", "HEAD"]) else {
+        return UNKNOWN.to_owned();
+    };
     match git(&["status", "--porcelain", "--untracked-files=no"]) {
         Some(changes) if changes.is_empty() => commit,
         _ => commit + DIRTY,
@@ -40,7 +42,12 @@ pub fn is_pinned(revision: &str) -> bool {
 }
 
 fn git(arguments: &[&str]) -> Option<String> {
-    let output = Command::new("git").arg("-C").arg(env!("CARGO_MANIFEST_DIR")).args(arguments).output().ok()?;
+    let output = Command::new("git")
+        .arg("-C")
+        .arg(env!("CARGO_MANIFEST_DIR"))
+        .args(arguments)
+        .output()
+        .ok()?;
     let text = String::from_utf8(output.stdout).ok()?;
     output.status.success().then(|| text.trim().to_owned())
 }

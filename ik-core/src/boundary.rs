@@ -25,7 +25,7 @@ pub enum Boundary {
     /// |q̇| ≤ q̇max, approach no faster than κ·distance, leave no faster than κ·distance + v0 (notes, table 1 row 17:
     /// the source cites a polygon without giving its numbers).
     Polygon {
-        /// κ (1/s); κ Δt must be below 1.
+        /// κ (1/s).
         approach_per_s: f64,
         /// v0 (rad/s or m/s), above 0: with 0 a joint on its limit could never leave it.
         exit_speed: f64,
@@ -46,7 +46,9 @@ pub enum BoundaryError {
         allowed: &'static str,
     },
     /// The margin leaves nothing of a joint's range.
-    #[error("boundary margin = {margin} leaves no range for joint `{joint}`: its limits are {lower} .. {upper}")]
+    #[error(
+        "boundary margin = {margin} leaves no range for joint `{joint}`: its limits are {lower} .. {upper}"
+    )]
     Margin {
         /// Name of the joint.
         joint: String,
@@ -74,12 +76,25 @@ impl Boundary {
     /// Checks the parameters against a robot.
     pub fn validate(&self, robot: &Robot) -> Result<(), BoundaryError> {
         let check = |field, value: f64, good: bool, allowed| {
-            if good { Ok(()) } else { Err(BoundaryError::Parameter { field, value, allowed }) }
+            if good {
+                Ok(())
+            } else {
+                Err(BoundaryError::Parameter {
+                    field,
+                    value,
+                    allowed,
+                })
+            }
         };
         match *self {
             Self::None | Self::Positions | Self::Box => Ok(()),
             Self::Ellipse { margin } => {
-                check("margin", margin, margin.is_finite() && margin >= 0.0, "finite and not negative")?;
+                check(
+                    "margin",
+                    margin,
+                    margin.is_finite() && margin >= 0.0,
+                    "finite and not negative",
+                )?;
                 for c in robot.coordinates() {
                     if c.limits.upper - c.limits.lower - 2.0 * margin <= 0.0 {
                         return Err(BoundaryError::Margin {
@@ -92,7 +107,10 @@ impl Boundary {
                 }
                 Ok(())
             }
-            Self::Polygon { approach_per_s, exit_speed } => {
+            Self::Polygon {
+                approach_per_s,
+                exit_speed,
+            } => {
                 let good = approach_per_s.is_finite() && approach_per_s > 0.0;
                 check("approach_per_s", approach_per_s, good, "finite and above 0")?;
                 let good = exit_speed.is_finite() && exit_speed > 0.0;
@@ -105,13 +123,18 @@ impl Boundary {
     pub fn interval(&self, limits: &Limits, q_prev: f64, dt_s: f64) -> Interval {
         let reach = limits.velocity * dt_s;
         match *self {
-            Self::None => Interval { lo: f64::NEG_INFINITY, hi: f64::INFINITY, outside: false },
+            Self::None => Interval {
+                lo: f64::NEG_INFINITY,
+                hi: f64::INFINITY,
+                outside: false,
+            },
             Self::Positions => position_interval(limits, q_prev, f64::INFINITY),
             Self::Box => position_interval(limits, q_prev, reach),
             Self::Ellipse { margin } => ellipse_interval(limits, margin, q_prev, reach),
-            Self::Polygon { approach_per_s, exit_speed } => {
-                polygon_interval(limits, approach_per_s * dt_s, exit_speed * dt_s, q_prev, reach)
-            }
+            Self::Polygon {
+                approach_per_s,
+                exit_speed,
+            } => polygon_interval(limits, approach_per_s * dt_s, exit_speed * dt_s, q_prev, reach),
         }
     }
 
@@ -124,7 +147,11 @@ impl Boundary {
 /// Where q⁻ admits no increment: move to the nearest admissible position, at most `reach` per step (notes §2).
 fn recover(q_prev: f64, nearest: f64, reach: f64) -> Interval {
     let dq = (nearest - q_prev).clamp(-reach, reach);
-    Interval { lo: dq, hi: dq, outside: true }
+    Interval {
+        lo: dq,
+        hi: dq,
+        outside: true,
+    }
 }
 
 fn position_interval(limits: &Limits, q_prev: f64, reach: f64) -> Interval {
@@ -133,7 +160,11 @@ fn position_interval(limits: &Limits, q_prev: f64, reach: f64) -> Interval {
     if lo > hi {
         return recover(q_prev, q_prev.clamp(limits.lower, limits.upper), reach);
     }
-    Interval { lo, hi, outside: false }
+    Interval {
+        lo,
+        hi,
+        outside: false,
+    }
 }
 
 /// Faraji & Ijspeert (2017), eq. (6) with q̇ = Δq/Δt: `(u/h)² + ((u − u⁻)/v)² ≤ 1` in u = q − (ql + qu)/2, h the half range
@@ -147,7 +178,15 @@ fn ellipse_interval(limits: &Limits, margin: f64, q_prev: f64, reach: f64) -> In
     let h = 0.5 * (limits.upper - limits.lower) - margin;
     let u = q_prev - middle;
     if reach.is_infinite() {
-        return position_interval(&Limits { lower: middle - h, upper: middle + h, ..*limits }, q_prev, reach);
+        return position_interval(
+            &Limits {
+                lower: middle - h,
+                upper: middle + h,
+                ..*limits
+            },
+            q_prev,
+            reach,
+        );
     }
     let sum = h * h + reach * reach;
     let discriminant = sum - u * u;
@@ -158,7 +197,11 @@ fn ellipse_interval(limits: &Limits, margin: f64, q_prev: f64, reach: f64) -> In
     // Rounding must not let a joint on its limit pass it: the ends are cut to |u| ≤ h.
     let lo = (centre - half).max(-h - u);
     let hi = (centre + half).min(h - u);
-    Interval { lo: lo.min(hi), hi: hi.max(lo), outside: false }
+    Interval {
+        lo: lo.min(hi),
+        hi: hi.max(lo),
+        outside: false,
+    }
 }
 
 /// Notes §2, polygon: with s⁻, r⁻ the distances of q⁻ from the lower and upper limit and κ' = κΔt, v' = v0Δt, the
@@ -169,10 +212,19 @@ fn polygon_interval(limits: &Limits, kappa: f64, exit: f64, q_prev: f64, reach: 
         return recover(q_prev, q_prev.clamp(limits.lower, limits.upper), reach);
     }
     let slow = 1.0 / (1.0 + kappa);
-    let fast = 1.0 / (1.0 - kappa);
+    // From κΔt = 1 on, the speed allowed at the new position grows faster than the position: no bound remains.
+    let fast = if kappa < 1.0 {
+        1.0 / (1.0 - kappa)
+    } else {
+        f64::INFINITY
+    };
     let lo = (-reach).max(s * slow - s).max(r - (r + exit) * fast);
     let hi = reach.min(r - r * slow).min((s + exit) * fast - s);
-    Interval { lo, hi, outside: false }
+    Interval {
+        lo,
+        hi,
+        outside: false,
+    }
 }
 
 #[cfg(test)]
@@ -180,18 +232,26 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const KNEE: Limits = Limits { lower: 0.0, upper: 1.9199, velocity: 4.0, effort: 50.0 };
+    const KNEE: Limits = Limits {
+        lower: 0.0,
+        upper: 1.9199,
+        velocity: 4.0,
+        effort: 50.0,
+    };
     const DT: f64 = 0.005;
 
     /// Eq. (6) as printed.
     fn g(limits: &Limits, margin: f64, q: f64, velocity: f64) -> f64 {
         let range = limits.upper - limits.lower - 2.0 * margin;
-        ((2.0 * q - (limits.lower + limits.upper)) / range).powi(2) + (velocity / limits.velocity).powi(2) - 1.0
+        ((2.0 * q - (limits.lower + limits.upper)) / range).powi(2) + (velocity / limits.velocity).powi(2)
+            - 1.0
     }
 
     /// Largest and least admissible increments by bisection on a fine grid.
     fn brute_force(admissible: impl Fn(f64) -> bool, reach: f64) -> Option<(f64, f64)> {
-        let grid: Vec<f64> = (0..=40_000).map(|k| reach * (f64::from(k) / 20_000.0 - 1.0)).collect();
+        let grid: Vec<f64> = (0..=40_000)
+            .map(|k| reach * (f64::from(k) / 20_000.0 - 1.0))
+            .collect();
         let inside: Vec<f64> = grid.into_iter().filter(|&d| admissible(d)).collect();
         Some((*inside.first()?, *inside.last()?))
     }
@@ -256,7 +316,7 @@ mod tests {
         let i = Boundary::Box.interval(&KNEE, 0.01, DT);
         assert_eq!((i.lo, i.hi), (-0.01, 0.02));
         let i = Boundary::Box.interval(&KNEE, -0.5, DT);
-        assert!(i.outside && i.lo == 0.02 && i.hi == 0.02);
+        assert_eq!((i.lo, i.hi, i.outside), (0.02, 0.02, true));
         let i = Boundary::None.interval(&KNEE, -0.5, DT);
         assert!(i.lo == f64::NEG_INFINITY && !i.outside);
     }

@@ -66,7 +66,12 @@ impl Driver {
     /// # Errors
     /// The formulation's refusal.
     pub fn new(formulation: &dyn Formulation, problem: &Arc<Problem>) -> Result<Self, Declined> {
-        let Prepared { stepper, majors, honours, notes } = formulation.prepare(problem)?;
+        let Prepared {
+            stepper,
+            majors,
+            honours,
+            notes,
+        } = formulation.prepare(problem)?;
         let nv = problem.robot().nv();
         Ok(Self {
             problem: Arc::clone(problem),
@@ -130,17 +135,28 @@ impl Driver {
             return Err(StepError::TimeStep(input.dt_s));
         }
         if input.phase.0 >= self.problem.phases().len() {
-            return Err(StepError::Phase { found: input.phase.0, count: self.problem.phases().len() });
+            return Err(StepError::Phase {
+                found: input.phase.0,
+                count: self.problem.phases().len(),
+            });
         }
         for (field, values) in [("q_prev", input.q_prev), ("v_prev", input.v_prev)] {
             if let Some((index, value)) = values.iter().enumerate().find(|(_, v)| !v.is_finite()) {
-                return Err(StepError::Value { field, index, value: *value });
+                return Err(StepError::Value {
+                    field,
+                    index,
+                    value: *value,
+                });
             }
         }
         if robot.root() == crate::robot::Root::Floating {
             let norm = input.q_prev[3..7].iter().map(|c| c * c).sum::<f64>().sqrt();
             if (norm - 1.0).abs() > UNIT_TOLERANCE {
-                return Err(StepError::Value { field: "q_prev", index: 3, value: input.q_prev[3] });
+                return Err(StepError::Value {
+                    field: "q_prev",
+                    index: 3,
+                    value: input.q_prev[3],
+                });
             }
         }
         Ok(())
@@ -158,7 +174,11 @@ impl Driver {
             dt_s: input.dt_s,
             phase: input.phase,
             targets: input.targets,
-            bounds: Bounds { lo: &self.lo, hi: &self.hi, outside },
+            bounds: Bounds {
+                lo: &self.lo,
+                hi: &self.hi,
+                outside,
+            },
             gains: input.gains,
         };
         self.evaluator.meter.arm(majors);

@@ -50,7 +50,10 @@ impl Meter {
     }
 
     pub(crate) fn arm(&mut self, budget: u32) {
-        *self = Self { counts: Counts::default(), budget };
+        *self = Self {
+            counts: Counts::default(),
+            budget,
+        };
     }
 }
 
@@ -92,7 +95,10 @@ impl Linearisation {
 impl Evaluator {
     /// An evaluator for `problem`.
     pub fn new(problem: &Arc<Problem>) -> Self {
-        Self { problem: Arc::clone(problem), meter: Meter::default() }
+        Self {
+            problem: Arc::clone(problem),
+            meter: Meter::default(),
+        }
     }
 
     /// One tree pass at `q` (length nq).
@@ -131,8 +137,12 @@ impl Evaluator {
     fn second(&self, lin: &mut Linearisation, target: Sample<'_>, u: &[f64]) {
         let layout = self.problem.layout(lin.phase);
         let robot = self.problem.robot();
-        layout.hard.fill_second(robot, &lin.page, &mut lin.second, target.x, u, &mut lin.hard);
-        layout.soft.fill_second(robot, &lin.page, &mut lin.second, target.x, u, &mut lin.soft);
+        layout
+            .hard
+            .fill_second(robot, &lin.page, &mut lin.second, target.x, u, &mut lin.hard);
+        layout
+            .soft
+            .fill_second(robot, &lin.page, &mut lin.second, target.x, u, &mut lin.soft);
     }
 
     /// Adds the gain-weighted gradients of the problem's objectives to `gradient` (length nv); returns the weighted sum
@@ -140,7 +150,9 @@ impl Evaluator {
     pub fn add_objectives(&self, q: &[f64], gains: &[f64], gradient: &mut [f64]) -> f64 {
         let robot = self.problem.robot();
         let objectives = self.problem.objectives().iter().zip(gains);
-        objectives.map(|(o, &gain)| gain * o.add_gradient(robot, q, gain, gradient)).sum()
+        objectives
+            .map(|(o, &gain)| gain * o.add_gradient(robot, q, gain, gradient))
+            .sum()
     }
 
     /// Lends at most `majors` of the budget to `inner`: a wrapper cannot spend more on an inner method than it decided.

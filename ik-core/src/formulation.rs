@@ -194,7 +194,12 @@ impl Solution {
         Self {
             q: problem.robot().neutral(),
             v: vec![0.0; nv],
-            claim: Claim { has: false, hard: vec![0.0; hard], bound: vec![0.0; nv], own: vec![0.0; nv] },
+            claim: Claim {
+                has: false,
+                hard: vec![0.0; hard],
+                bound: vec![0.0; nv],
+                own: vec![0.0; nv],
+            },
         }
     }
 }

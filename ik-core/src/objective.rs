@@ -18,7 +18,9 @@ impl Objective {
     pub fn add_gradient(&self, robot: &Robot, q: &[f64], gain: f64, gradient: &mut [f64]) -> f64 {
         match self {
             Self::JointCentring => {
-                let joints = q[robot.root().nq()..].iter().zip(&mut gradient[robot.root().nv()..]);
+                let joints = q[robot.root().nq()..]
+                    .iter()
+                    .zip(&mut gradient[robot.root().nv()..]);
                 let mut value = 0.0;
                 for (c, (q, g)) in robot.coordinates().iter().zip(joints) {
                     let half = 0.5 * (c.limits.upper - c.limits.lower);

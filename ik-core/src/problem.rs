@@ -150,8 +150,18 @@ impl Problem {
             nx += task.track.target_len(&parts.robot, parts.orientation);
             nxdot += task.track.rows(&parts.robot);
         }
-        let layouts = parts.phases.iter().map(|phase| RowLayout::new(&parts, phase, &slots)).collect();
-        Ok(Self { parts, slots, nx, nxdot, layouts })
+        let layouts = parts
+            .phases
+            .iter()
+            .map(|phase| RowLayout::new(&parts, phase, &slots))
+            .collect();
+        Ok(Self {
+            parts,
+            slots,
+            nx,
+            nxdot,
+            layouts,
+        })
     }
 
     /// The robot.
@@ -229,7 +239,10 @@ fn check_tasks(parts: &ProblemParts) -> Result<(), ProblemError> {
         }
         check_track(parts, task)?;
     }
-    parts.phases.iter().try_for_each(|phase| check_phase(parts, phase))
+    parts
+        .phases
+        .iter()
+        .try_for_each(|phase| check_phase(parts, phase))
 }
 
 fn check_track(parts: &ProblemParts, task: &Task) -> Result<(), ProblemError> {
@@ -243,7 +256,10 @@ fn check_track(parts: &ProblemParts, task: &Task) -> Result<(), ProblemError> {
             })
         }
         Track::CentreOfMass if crate::kinematics::Page::new(&parts.robot).moving_mass_kg() <= 0.0 => {
-            Err(ProblemError::Massless { task: task.name.clone(), robot: parts.robot.name().to_owned() })
+            Err(ProblemError::Massless {
+                task: task.name.clone(),
+                robot: parts.robot.name().to_owned(),
+            })
         }
         _ => Ok(()),
     }
@@ -271,12 +287,18 @@ fn check_phase(parts: &ProblemParts, phase: &Phase) -> Result<(), ProblemError> 
 
 fn check_weights(task: &str, weights: &Weights, rows: usize) -> Result<(), ProblemError> {
     let fail = |found: String, allowed: &str| {
-        Err(ProblemError::Weights { task: task.to_owned(), found, allowed: allowed.to_owned() })
+        Err(ProblemError::Weights {
+            task: task.to_owned(),
+            found,
+            allowed: allowed.to_owned(),
+        })
     };
     let good = |w: &f64| w.is_finite() && *w >= 0.0;
     match weights {
         Weights::Uniform(w) if !good(w) => fail(format!("{w}"), "finite and not negative"),
-        Weights::Diagonal(d) if d.len() != rows => fail(format!("{} entries", d.len()), &format!("{rows} entries")),
+        Weights::Diagonal(d) if d.len() != rows => {
+            fail(format!("{} entries", d.len()), &format!("{rows} entries"))
+        }
         Weights::Diagonal(d) if !d.iter().all(good) => fail(format!("{d:?}"), "finite and not negative"),
         Weights::Matrix(m) => {
             if m.len() != rows || m.iter().any(|r| r.len() != rows) {

@@ -55,7 +55,13 @@ struct At {
 
 #[derive(Clone, Debug)]
 enum Block {
-    Frame { body: usize, p: Vector3<f64>, r: Matrix3<f64>, position: Option<At>, orientation: Option<At> },
+    Frame {
+        body: usize,
+        p: Vector3<f64>,
+        r: Matrix3<f64>,
+        position: Option<At>,
+        orientation: Option<At>,
+    },
     CentreOfMass(At),
     Posture(At),
 }
@@ -114,10 +120,20 @@ impl RowSet {
 
     fn push(&mut self, parts: &ProblemParts, task: usize, track: Track, slot: Slot) {
         let rows = track.rows(&parts.robot);
-        let at = |offset: usize| At { row: self.rows + offset, x: slot.x + offset, xdot: slot.xdot + offset };
+        let at = |offset: usize| At {
+            row: self.rows + offset,
+            x: slot.x + offset,
+            xdot: slot.xdot + offset,
+        };
         let frame = |f: crate::robot::FrameId, position, orientation| {
             let (body, r, p) = &parts.robot.aligned_frames[f.0];
-            Block::Frame { body: *body, p: *p, r: *r, position, orientation }
+            Block::Frame {
+                body: *body,
+                p: *p,
+                r: *r,
+                position,
+                orientation,
+            }
         };
         let block = match track {
             Track::Position(f) => frame(f, Some(at(0)), None),
@@ -127,7 +143,11 @@ impl RowSet {
             Track::Posture => Block::Posture(at(0)),
         };
         self.blocks.push(block);
-        self.groups.push(RowGroup { task, row: self.rows, rows });
+        self.groups.push(RowGroup {
+            task,
+            row: self.rows,
+            rows,
+        });
         self.rows += rows;
     }
 
@@ -137,7 +157,13 @@ impl RowSet {
         rows.jacobian.fill(0.0);
         for block in &self.blocks {
             match block {
-                Block::Frame { body, p, r, position, orientation } => {
+                Block::Frame {
+                    body,
+                    p,
+                    r,
+                    position,
+                    orientation,
+                } => {
                     let pose = &page.bodies[*body];
                     let point = pose.point(p);
                     if let Some(at) = position {
@@ -209,7 +235,13 @@ impl RowSet {
         rows.second.fill(0.0);
         for block in &self.blocks {
             match block {
-                Block::Frame { body, p, r, position, orientation } => {
+                Block::Frame {
+                    body,
+                    p,
+                    r,
+                    position,
+                    orientation,
+                } => {
                     let pose = &page.bodies[*body];
                     let point = (*body, pose.point(p));
                     let map = orientation.map(|at| (at.row, self.row_map(&pose.rotation(r), at, target)));
@@ -242,11 +274,16 @@ impl RowSet {
             let ld = rows.ld;
             match part {
                 Part::Linear => {
-                    rows.jacobian.chunks_exact_mut(ld).for_each(|c| multiply(root, &mut c[*row..]));
+                    rows.jacobian
+                        .chunks_exact_mut(ld)
+                        .for_each(|c| multiply(root, &mut c[*row..]));
                     multiply(root, &mut rows.error[*row..]);
                     multiply(root, &mut rows.rate[*row..]);
                 }
-                Part::Second => rows.second.chunks_exact_mut(ld).for_each(|c| multiply(root, &mut c[*row..])),
+                Part::Second => rows
+                    .second
+                    .chunks_exact_mut(ld)
+                    .for_each(|c| multiply(root, &mut c[*row..])),
             }
         }
     }
@@ -395,9 +432,17 @@ impl Rows {
         add3(&mut self.jacobian, v * self.ld + row, value);
     }
 
-    fn fill_position(&mut self, robot: &Robot, page: &Page, (body, point): (usize, Lane), position: Option<At>) {
+    fn fill_position(
+        &mut self,
+        robot: &Robot,
+        page: &Page,
+        (body, point): (usize, Lane),
+        position: Option<At>,
+    ) {
         if let Some(at) = position {
-            for_each_column(robot, page, body, point, |v, linear, _| self.add3(v, at.row, &linear));
+            for_each_column(robot, page, body, point, |v, linear, _| {
+                self.add3(v, at.row, &linear)
+            });
         }
     }
 
@@ -417,7 +462,10 @@ impl Rows {
         });
     }
 
-    #[allow(clippy::too_many_arguments, reason = "one call site; a struct would only rename them")]
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "one call site; a struct would only rename them"
+    )]
     fn fill_frame_second(
         &mut self,
         robot: &Robot,
@@ -458,7 +506,11 @@ impl Rows {
         }
         let half = [0.5 * u[3], 0.5 * u[4], 0.5 * u[5]];
         // Columns of [·]ₓ: e_k × u.
-        let turned = [[0.0, -half[2], half[1]], [half[2], 0.0, -half[0]], [-half[1], half[0], 0.0]];
+        let turned = [
+            [0.0, -half[2], half[1]],
+            [half[2], 0.0, -half[0]],
+            [-half[1], half[0], 0.0],
+        ];
         self.add_root_rotation(turned);
     }
 
@@ -467,8 +519,11 @@ impl Rows {
         let first = robot.root().nv();
         let ld = self.ld;
         let plain = if robot.root() == Root::Floating { 3 } else { 0 };
-        for (v, (out, column)) in
-            self.second.chunks_exact_mut(ld).zip(self.jacobian.chunks_exact(ld)).enumerate()
+        for (v, (out, column)) in self
+            .second
+            .chunks_exact_mut(ld)
+            .zip(self.jacobian.chunks_exact(ld))
+            .enumerate()
         {
             if v < plain || v >= first {
                 out.iter_mut().zip(column).for_each(|(o, c)| *o += c);

@@ -24,14 +24,21 @@ const H: f64 = 1e-5;
 const PHASE: PhaseId = PhaseId(0);
 
 fn target(problem: &Problem, random: &mut Random) -> (Vec<f64>, Vec<f64>) {
-    (random.vector(problem.nx(), 0.7), random.vector(problem.nxdot(), 0.5))
+    (
+        random.vector(problem.nx(), 0.7),
+        random.vector(problem.nxdot(), 0.5),
+    )
 }
 
 /// Random configurations, zero (straight legs, stretched arms) and one with every joint on a limit.
 fn configurations(robot: &Robot, random: &mut Random) -> Vec<Vec<f64>> {
     let mut at_limits = random.configuration(robot, 0.8);
     for (q, c) in at_limits[robot.root().nq()..].iter_mut().zip(robot.coordinates()) {
-        *q = if c.limits.lower.is_finite() { c.limits.lower } else { 0.0 };
+        *q = if c.limits.lower.is_finite() {
+            c.limits.lower
+        } else {
+            0.0
+        };
     }
     vec![
         robot.neutral(),
@@ -60,9 +67,16 @@ struct Fixture {
 
 impl Fixture {
     fn rows_at(&mut self, q: &[f64]) -> Rows {
-        let target = Sample { x: &self.x, xdot: &self.xdot };
+        let target = Sample {
+            x: &self.x,
+            xdot: &self.xdot,
+        };
         self.evaluator.linearise(q, PHASE, target, &mut self.lin);
-        if self.lin.hard.rows() > 0 { self.lin.hard.clone() } else { self.lin.soft.clone() }
+        if self.lin.hard.rows() > 0 {
+            self.lin.hard.clone()
+        } else {
+            self.lin.soft.clone()
+        }
     }
 }
 
@@ -101,7 +115,9 @@ fn near_gimbal_lock(fixture: &Fixture, q: &[f64]) -> bool {
     if fixture.problem.orientation() == OrientationCoordinates::Log {
         return false;
     }
-    let (Track::Orientation(f) | Track::Pose(f)) = fixture.problem.tasks()[0].track else { return false };
+    let (Track::Orientation(f) | Track::Pose(f)) = fixture.problem.tasks()[0].track else {
+        return false;
+    };
     let mut page = Page::new(robot);
     forward(robot, q, &mut page);
     page.frame_rotation(robot, f)[(2, 0)].abs() > 0.97
@@ -155,7 +171,10 @@ fn rates_keep_the_rows_at_rest_along_the_target() {
 fn moved_target(problem: &Problem, x: &[f64], xdot: &[f64], s: f64) -> Vec<f64> {
     let turned = |q: &[f64], w: &[f64]| {
         let q = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(q[3], q[0], q[1], q[2]));
-        (so3::exp_quaternion(&(Vector3::from_column_slice(w) * s)) * q).coords.as_slice().to_vec()
+        (so3::exp_quaternion(&(Vector3::from_column_slice(w) * s)) * q)
+            .coords
+            .as_slice()
+            .to_vec()
     };
     let added = |x: &[f64], v: &[f64]| x.iter().zip(v).map(|(x, v)| x + s * v).collect::<Vec<f64>>();
     match (problem.tasks()[0].track, problem.orientation()) {
@@ -187,9 +206,18 @@ fn velocity_derivative_is_the_derivative_of_the_velocity_row() {
         }
         let dq = difference(&robot, &q_prev, q);
         fixture.rows_at(q);
-        let target = Sample { x: &fixture.x, xdot: &fixture.xdot };
-        fixture.evaluator.velocity_derivative(&mut fixture.lin, target, &dq);
-        let rows = if fixture.lin.hard.rows() > 0 { &fixture.lin.hard } else { &fixture.lin.soft };
+        let target = Sample {
+            x: &fixture.x,
+            xdot: &fixture.xdot,
+        };
+        fixture
+            .evaluator
+            .velocity_derivative(&mut fixture.lin, target, &dq);
+        let rows = if fixture.lin.hard.rows() > 0 {
+            &fixture.lin.hard
+        } else {
+            &fixture.lin.soft
+        };
         let worst = (matrix(rows, &rows.second) - &numeric).amax();
         assert!(worst < 1e-6 * (1.0 + numeric.amax()), "{label}: {worst:e}");
     });
@@ -203,24 +231,38 @@ fn hessians_are_second_derivatives_and_symmetric() {
         let (u, w) = (random.vector(n, 1.0), random.vector(n, 1.0));
         let product = |fixture: &mut Fixture, u: &[f64]| {
             fixture.rows_at(q);
-            let target = Sample { x: &fixture.x, xdot: &fixture.xdot };
+            let target = Sample {
+                x: &fixture.x,
+                xdot: &fixture.xdot,
+            };
             fixture.evaluator.hessian_product(&mut fixture.lin, target, u);
-            let rows = if fixture.lin.hard.rows() > 0 { &fixture.lin.hard } else { &fixture.lin.soft };
+            let rows = if fixture.lin.hard.rows() > 0 {
+                &fixture.lin.hard
+            } else {
+                &fixture.lin.soft
+            };
             matrix(rows, &rows.second)
         };
         let hu = product(fixture, &u) * DVector::from_vec(w.clone());
         let hw = product(fixture, &w) * DVector::from_vec(u.clone());
-        assert!((&hu - &hw).amax() < 1e-12 * (1.0 + hu.amax()), "{label}: not symmetric");
+        assert!(
+            (&hu - &hw).amax() < 1e-12 * (1.0 + hu.amax()),
+            "{label}: not symmetric"
+        );
         // uᵀ H u by the second difference of the error along u.
         let step = 2e-4;
         let along = |fixture: &mut Fixture, s: f64| {
             let d: Vec<f64> = u.iter().map(|u| u * s * step).collect();
             error(&fixture.rows_at(&integrate(&robot, q, &d)))
         };
-        let numeric = (along(fixture, 1.0) + along(fixture, -1.0) - along(fixture, 0.0) * 2.0) / (step * step);
+        let numeric =
+            (along(fixture, 1.0) + along(fixture, -1.0) - along(fixture, 0.0) * 2.0) / (step * step);
         let analytic = product(fixture, &u) * DVector::from_vec(u.clone());
         let scale = 1.0 + analytic.amax();
-        assert!((&analytic - &numeric).amax() < 2e-5 * scale * scale, "{label}: {analytic} {numeric}");
+        assert!(
+            (&analytic - &numeric).amax() < 2e-5 * scale * scale,
+            "{label}: {analytic} {numeric}"
+        );
     });
 }
 
@@ -240,13 +282,19 @@ fn frame_jacobians_match_differences_in_world_and_body_axes() {
                 let mut at = |s: f64| {
                     let d: Vec<f64> = u.iter().map(|u| u * s).collect();
                     forward(&robot, &integrate(&robot, &q, &d), &mut page);
-                    (page.frame_position(&robot, frame), page.frame_rotation(&robot, frame))
+                    (
+                        page.frame_position(&robot, frame),
+                        page.frame_rotation(&robot, frame),
+                    )
                 };
                 let ((p1, r1), (p0, r0)) = (at(H), at(-H));
                 let linear = (p1 - p0) / (2.0 * H);
                 let angular = so3::log(&(r1 * r0.transpose())) / (2.0 * H);
                 let v = &world * DVector::from_vec(u.clone());
-                assert!((v.fixed_rows::<3>(0) - linear).norm() < 1e-7 && (v.fixed_rows::<3>(3) - angular).norm() < 1e-7);
+                assert!(
+                    (v.fixed_rows::<3>(0) - linear).norm() < 1e-7
+                        && (v.fixed_rows::<3>(3) - angular).norm() < 1e-7
+                );
                 let vb = &body * DVector::from_vec(u);
                 assert!((r * vb.fixed_rows::<3>(0) - linear).norm() < 1e-7);
                 assert!((r * vb.fixed_rows::<3>(3) - angular).norm() < 1e-7);
@@ -260,10 +308,17 @@ fn integrate_and_difference_are_inverse_and_keep_unit_quaternions() {
     let mut random = Random(11);
     for robot in robots() {
         for _ in 0..200 {
-            let (a, b) = (random.configuration(&robot, 1.3), random.configuration(&robot, 1.3));
+            let (a, b) = (
+                random.configuration(&robot, 1.3),
+                random.configuration(&robot, 1.3),
+            );
             let d = difference(&robot, &a, &b);
             let back = integrate(&robot, &a, &d);
-            assert!(difference(&robot, &b, &back).iter().all(|e| e.abs() < 1e-14 * 10.0));
+            assert!(
+                difference(&robot, &b, &back)
+                    .iter()
+                    .all(|e| e.abs() < 1e-14 * 10.0)
+            );
             let tiny: Vec<f64> = random.vector(robot.nv(), 1e-9);
             let moved = difference(&robot, &a, &integrate(&robot, &a, &tiny));
             assert!(moved.iter().zip(&tiny).all(|(m, t)| (m - t).abs() < 1e-15));
@@ -272,7 +327,11 @@ fn integrate_and_difference_are_inverse_and_keep_unit_quaternions() {
             }
         }
         let q = random.configuration(&robot, 1.0);
-        assert!(difference(&robot, &q, &integrate(&robot, &q, &vec![0.0; robot.nv()])).iter().all(|e| e.abs() < 1e-15));
+        assert!(
+            difference(&robot, &q, &integrate(&robot, &q, &vec![0.0; robot.nv()]))
+                .iter()
+                .all(|e| e.abs() < 1e-15)
+        );
     }
 }
 
@@ -300,7 +359,9 @@ fn static_torques_balance_virtual_work() {
             }
             let mass = page.moving_mass_kg();
             let power: f64 = torque.iter().zip(&d[first..]).map(|(t, d)| t * d).sum();
-            let climb: f64 = (0..robot.nv()).map(|v| page.centre_of_mass_column(v).z * d[v]).sum();
+            let climb: f64 = (0..robot.nv())
+                .map(|v| page.centre_of_mass_column(v).z * d[v])
+                .sum();
             assert!((power - mass * GRAVITY_M_S2 * climb).abs() < 1e-9 * (1.0 + power.abs()));
         }
     }

@@ -7,7 +7,9 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use ik_methods::qp::{ActiveSet, ClarabelQp, Lexicographic, MatRef, Outcome, Qp, QpSolution, QpSolver, QpStatus};
+use ik_methods::qp::{
+    ActiveSet, ClarabelQp, Lexicographic, MatRef, Outcome, Qp, QpSolution, QpSolver, QpStatus,
+};
 
 /// SplitMix64 (Steele, Lea & Flood 2014).
 struct Draw(u64);
@@ -45,16 +47,32 @@ impl Problem {
         let jacobian = draw.vector(soft * n, 1.0);
         let target = draw.vector(soft, pull);
         let row = |r: usize, j: usize| jacobian[r + j * soft];
-        let mut h: Vec<f64> =
-            (0..n * n).map(|index| (0..soft).map(|r| row(r, index % n) * row(r, index / n)).sum()).collect();
+        let mut h: Vec<f64> = (0..n * n)
+            .map(|index| (0..soft).map(|r| row(r, index % n) * row(r, index / n)).sum())
+            .collect();
         (0..n).for_each(|i| h[i * (n + 1)] += 0.01);
-        let g = (0..n).map(|j| -(0..soft).map(|r| row(r, j) * target[r]).sum::<f64>()).collect();
+        let g = (0..n)
+            .map(|j| -(0..soft).map(|r| row(r, j) * target[r]).sum::<f64>())
+            .collect();
         let a = draw.vector(m * n, 0.3);
         let met = draw.vector(n, 0.002);
-        let b = (0..m).map(|r| (0..n).map(|j| a[r + j * m] * met[j]).sum()).collect();
-        let lo = (0..n).map(|j| if j < 6 { f64::NEG_INFINITY } else { -0.02 }).collect();
+        let b = (0..m)
+            .map(|r| (0..n).map(|j| a[r + j * m] * met[j]).sum())
+            .collect();
+        let lo = (0..n)
+            .map(|j| if j < 6 { f64::NEG_INFINITY } else { -0.02 })
+            .collect();
         let hi = (0..n).map(|j| if j < 6 { f64::INFINITY } else { 0.02 }).collect();
-        Self { n, m, h, g, a, b, lo, hi }
+        Self {
+            n,
+            m,
+            h,
+            g,
+            a,
+            b,
+            lo,
+            hi,
+        }
     }
 
     fn view(&self) -> Qp<'_> {
@@ -70,7 +88,10 @@ impl Problem {
 
     fn active(&self) -> usize {
         let mut out = QpSolution::new(self.n, self.m);
-        assert_eq!(ActiveSet::new(self.n, self.m).solve(&self.view(), &mut out), QpStatus::Solved);
+        assert_eq!(
+            ActiveSet::new(self.n, self.m).solve(&self.view(), &mut out),
+            QpStatus::Solved
+        );
         out.z.iter().filter(|z| z.abs() > 0.0).count()
     }
 
@@ -90,8 +111,14 @@ impl Problem {
     /// The same problem a little later: objective and rows moved by a part in a thousand.
     fn next(&self) -> Self {
         let moved = |v: &[f64]| v.iter().map(|v| v * 1.001).collect();
-        Self { h: self.h.clone(), a: self.a.clone(), g: moved(&self.g), b: moved(&self.b), ..Self::new(0, self.n, 0, 1, 0.0) }
-            .with_rows(self.m)
+        Self {
+            h: self.h.clone(),
+            a: self.a.clone(),
+            g: moved(&self.g),
+            b: moved(&self.b),
+            ..Self::new(0, self.n, 0, 1, 0.0)
+        }
+        .with_rows(self.m)
     }
 
     fn with_rows(mut self, m: usize) -> Self {
@@ -102,13 +129,17 @@ impl Problem {
 
 fn cold(c: &mut Criterion, name: &str, problem: &Problem, solver: &mut dyn QpSolver) {
     let mut out = QpSolution::new(problem.n, problem.m);
-    c.benchmark_group("kernels").bench_function(format!("qp/{name}"), |bencher| {
-        bencher.iter(|| {
-            solver.reset();
-            assert_eq!(solver.solve(&black_box(problem.view()), &mut out), QpStatus::Solved);
-            out.x[0]
+    c.benchmark_group("kernels")
+        .bench_function(format!("qp/{name}"), |bencher| {
+            bencher.iter(|| {
+                solver.reset();
+                assert_eq!(
+                    solver.solve(&black_box(problem.view()), &mut out),
+                    QpStatus::Solved
+                );
+                out.x[0]
+            });
         });
-    });
 }
 
 fn warm(c: &mut Criterion, name: &str, problem: &Problem) {
@@ -116,13 +147,17 @@ fn warm(c: &mut Criterion, name: &str, problem: &Problem) {
     let mut solver = ActiveSet::new(problem.n, problem.m);
     let mut out = QpSolution::new(problem.n, problem.m);
     let mut turn = 0;
-    c.benchmark_group("kernels").bench_function(format!("qp/{name}"), |bencher| {
-        bencher.iter(|| {
-            turn = 1 - turn;
-            assert_eq!(solver.solve(&black_box(pair[turn].view()), &mut out), QpStatus::Solved);
-            out.x[0]
+    c.benchmark_group("kernels")
+        .bench_function(format!("qp/{name}"), |bencher| {
+            bencher.iter(|| {
+                turn = 1 - turn;
+                assert_eq!(
+                    solver.solve(&black_box(pair[turn].view()), &mut out),
+                    QpStatus::Solved
+                );
+                out.x[0]
+            });
         });
-    });
 }
 
 /// Rows that the box cannot follow: infeasible verdict, least-residual fit, objective.
@@ -131,31 +166,47 @@ fn relaxed(c: &mut Criterion) {
     problem.b[4] += 0.2;
     let mut solver = Lexicographic::new(problem.n, problem.m);
     let mut out = QpSolution::new(problem.n, problem.m);
-    c.benchmark_group("kernels").bench_function("qp/n18_m15_relaxed_warm", |bencher| {
-        bencher.iter(|| {
-            let outcome = solver.solve(&black_box(problem.view()), &mut out);
-            assert!(matches!(outcome, Outcome::Relaxed { .. }));
-            out.x[0]
+    c.benchmark_group("kernels")
+        .bench_function("qp/n18_m15_relaxed_warm", |bencher| {
+            bencher.iter(|| {
+                let outcome = solver.solve(&black_box(problem.view()), &mut out);
+                assert!(matches!(outcome, Outcome::Relaxed { .. }));
+                out.x[0]
+            });
         });
-    });
 }
 
 fn all(c: &mut Criterion) {
     for active in [0, 1, 2] {
         let problem = Problem::with_active(active, 18, 15, 3);
-        cold(c, &format!("n18_m15_active{active}_cold"), &problem, &mut ActiveSet::new(18, 15));
+        cold(
+            c,
+            &format!("n18_m15_active{active}_cold"),
+            &problem,
+            &mut ActiveSet::new(18, 15),
+        );
         warm(c, &format!("n18_m15_active{active}_warm"), &problem);
     }
     for active in [0, 3] {
         let problem = Problem::with_active(active, 18, 0, 6);
-        cold(c, &format!("n18_m0_active{active}_cold"), &problem, &mut ActiveSet::new(18, 0));
+        cold(
+            c,
+            &format!("n18_m0_active{active}_cold"),
+            &problem,
+            &mut ActiveSet::new(18, 0),
+        );
         warm(c, &format!("n18_m0_active{active}_warm"), &problem);
     }
     let large = Problem::with_active(6, 48, 18, 12);
     cold(c, "n48_m18_active6_cold", &large, &mut ActiveSet::new(48, 18));
     warm(c, "n48_m18_active6_warm", &large);
     relaxed(c);
-    cold(c, "n18_m15_active2_clarabel", &Problem::with_active(2, 18, 15, 3), &mut ClarabelQp);
+    cold(
+        c,
+        "n18_m15_active2_clarabel",
+        &Problem::with_active(2, 18, 15, 3),
+        &mut ClarabelQp,
+    );
 }
 
 criterion_group!(benches, all);

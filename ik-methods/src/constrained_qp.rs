@@ -88,7 +88,12 @@ impl Formulation for ConstrainedQp {
             allocation_free: true,
             counts: Trust::Metered,
         };
-        Ok(Prepared { stepper: Box::new(stepper), majors: 1, honours, notes: vec![] })
+        Ok(Prepared {
+            stepper: Box::new(stepper),
+            majors: 1,
+            honours,
+            notes: vec![],
+        })
     }
 }
 

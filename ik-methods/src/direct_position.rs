@@ -90,7 +90,10 @@ pub(crate) const GAMMA_FIELD: Field = Field {
     key: "gamma",
     unit: "-",
     meaning: "regulator: weight of the velocity row against the position row",
-    allowed: Allowed::Number { least: 0.0, largest: 1e6 },
+    allowed: Allowed::Number {
+        least: 0.0,
+        largest: 1e6,
+    },
 };
 pub(crate) const START_FIELD: Field = Field {
     key: "start",
@@ -102,13 +105,19 @@ pub(crate) const KICK_FIELD: Field = Field {
     key: "kick",
     unit: "rad, m",
     meaning: "distance from a limit at which the start moves a joint",
-    allowed: Allowed::Number { least: 0.0, largest: 1.0 },
+    allowed: Allowed::Number {
+        least: 0.0,
+        largest: 1.0,
+    },
 };
 pub(crate) const PROXIMAL_FIELD: Field = Field {
     key: "proximal",
     unit: "m²/rad²",
     meaning: "weight of the squared step in each quadratic program; vanishes at the solution",
-    allowed: Allowed::Number { least: 1e-12, largest: 1e6 },
+    allowed: Allowed::Number {
+        least: 1e-12,
+        largest: 1e6,
+    },
 };
 
 impl Parameters for DirectPositionParameters {
@@ -163,17 +172,27 @@ impl Method for DirectPosition {
 impl Formulation for DirectPosition {
     fn prepare(&self, problem: &Arc<Problem>) -> Result<Prepared, Declined> {
         let p = &self.parameters;
-        let model = CombinedRows { gamma: p.gamma, rows: p.rows };
+        let model = CombinedRows {
+            gamma: p.gamma,
+            rows: p.rows,
+        };
         let sqp = Sqp::new(
             problem,
             model,
             SqpParameters {
                 proximal: p.proximal,
                 step_tolerance: p.step_tolerance,
-                start: StartParameters { start: p.start, kick: p.kick },
+                start: StartParameters {
+                    start: p.start,
+                    kick: p.kick,
+                },
             },
         );
-        Ok(prepared(DirectPositionStepper { sqp }, p.n, p.rows == RegulatedRows::Soft))
+        Ok(prepared(
+            DirectPositionStepper { sqp },
+            p.n,
+            p.rows == RegulatedRows::Soft,
+        ))
     }
 }
 
@@ -186,7 +205,12 @@ pub(crate) fn prepared(stepper: impl Stepper + 'static, majors: u32, hard_rows: 
         allocation_free: true,
         counts: Trust::Metered,
     };
-    Prepared { stepper: Box::new(stepper), majors, honours, notes: vec![] }
+    Prepared {
+        stepper: Box::new(stepper),
+        majors,
+        honours,
+        notes: vec![],
+    }
 }
 
 #[derive(Debug)]
@@ -239,7 +263,13 @@ fn regulated(rows: &Rows, gamma: f64, dq: &[f64], dt_s: f64, out: &mut Block) {
     if gamma > 0.0 {
         rows.multiply_into(dq, &mut out.motion);
         let terms = out.motion.iter().zip(&rows.rate);
-        out.residual.iter_mut().zip(terms).for_each(|(r, (m, rate))| *r += gamma * (m - rate * dt_s));
-        out.matrix.iter_mut().zip(&rows.second).for_each(|(a, s)| *a += gamma * s);
+        out.residual
+            .iter_mut()
+            .zip(terms)
+            .for_each(|(r, (m, rate))| *r += gamma * (m - rate * dt_s));
+        out.matrix
+            .iter_mut()
+            .zip(&rows.second)
+            .for_each(|(a, s)| *a += gamma * s);
     }
 }

@@ -57,7 +57,10 @@ pub(crate) const DAMPING_FIELD: Field = Field {
     key: "damping",
     unit: "m²/rad²",
     meaning: "R = damping · I over all velocity coordinates, root included",
-    allowed: Allowed::Number { least: 1e-12, largest: 1e6 },
+    allowed: Allowed::Number {
+        least: 1e-12,
+        largest: 1e6,
+    },
 };
 
 impl Parameters for ErrorIntegrationParameters {
@@ -98,7 +101,12 @@ impl Formulation for ErrorIntegration {
             allocation_free: true,
             counts: Trust::Metered,
         };
-        Ok(Prepared { stepper: Box::new(stepper), majors: 1, honours, notes: vec![] })
+        Ok(Prepared {
+            stepper: Box::new(stepper),
+            majors: 1,
+            honours,
+            notes: vec![],
+        })
     }
 }
 
@@ -139,8 +147,16 @@ pub(crate) fn damped_step(
 ) -> Outcome {
     eval.linearise(q, step.phase, step.targets.now(), lin);
     qp.start(damping);
-    qp.add(Stack { matrix: &lin.soft.jacobian, ld: lin.soft.ld(), residual: &lin.soft.error });
-    let hard = Stack { matrix: &lin.hard.jacobian, ld: lin.hard.ld(), residual: &lin.hard.error };
+    qp.add(Stack {
+        matrix: &lin.soft.jacobian,
+        ld: lin.soft.ld(),
+        residual: &lin.soft.error,
+    });
+    let hard = Stack {
+        matrix: &lin.hard.jacobian,
+        ld: lin.hard.ld(),
+        residual: &lin.hard.error,
+    };
     qp.solve(hard, lin.hard.rows(), eval)
 }
 
@@ -159,7 +175,10 @@ mod tests {
         let mut page = ik_core::kinematics::Page::new(problem.robot());
         let mut tip = |q: f64| {
             ik_core::kinematics::forward(problem.robot(), &[q], &mut page);
-            page.frame_position(problem.robot(), ik_core::robot::FrameId(problem.robot().frames().len() - 1))
+            page.frame_position(
+                problem.robot(),
+                ik_core::robot::FrameId(problem.robot().frames().len() - 1),
+            )
         };
         let h = 1e-6;
         let j = (tip(0.1 + h) - tip(0.1 - h)) / (2.0 * h);

@@ -69,7 +69,12 @@ pub struct GaussNewtonParameters {
 
 impl Default for GaussNewtonParameters {
     fn default() -> Self {
-        Self { n: 15, damping: 1e-2, inner: Inner::Direct, step_tolerance: 1e-9 }
+        Self {
+            n: 15,
+            damping: 1e-2,
+            inner: Inner::Direct,
+            step_tolerance: 1e-9,
+        }
     }
 }
 
@@ -78,7 +83,10 @@ pub(crate) const STEP_TOLERANCE_FIELD: Field = Field {
     key: "step_tolerance",
     unit: "rad, m",
     meaning: "a step whose largest component is below this ends the iteration",
-    allowed: Allowed::Number { least: 1e-15, largest: 1.0 },
+    allowed: Allowed::Number {
+        least: 1e-15,
+        largest: 1.0,
+    },
 };
 
 impl Parameters for GaussNewtonParameters {
@@ -123,7 +131,13 @@ impl Formulation for GaussNewton {
             qp: StepQp::new(problem),
             cg: ProjectedCg::new(problem.robot().nv(), problem.largest_hard_rows()),
             q: vec![0.0; problem.robot().nq()],
-            rate: vec![0.0; problem.largest_hard_rows().max(problem.largest_soft_rows()).next_multiple_of(4)],
+            rate: vec![
+                0.0;
+                problem
+                    .largest_hard_rows()
+                    .max(problem.largest_soft_rows())
+                    .next_multiple_of(4)
+            ],
         };
         let honours = Honours {
             boundary: false,
@@ -132,7 +146,12 @@ impl Formulation for GaussNewton {
             allocation_free: true,
             counts: Trust::Metered,
         };
-        Ok(Prepared { stepper: Box::new(stepper), majors: self.parameters.n, honours, notes: vec![] })
+        Ok(Prepared {
+            stepper: Box::new(stepper),
+            majors: self.parameters.n,
+            honours,
+            notes: vec![],
+        })
     }
 }
 
@@ -201,9 +220,17 @@ impl GaussNewtonStepper {
         self.qp.start(self.parameters.damping);
         scaled(&lin.soft.rate, -step.dt_s, &mut self.rate);
         let (ld, residual) = (lin.soft.ld(), &self.rate[..lin.soft.ld().min(self.rate.len())]);
-        self.qp.add(Stack { matrix: &lin.soft.jacobian, ld, residual });
+        self.qp.add(Stack {
+            matrix: &lin.soft.jacobian,
+            ld,
+            residual,
+        });
         scaled(&lin.hard.rate, -step.dt_s, &mut self.rate);
-        let hard = Stack { matrix: &lin.hard.jacobian, ld: lin.hard.ld(), residual: &self.rate };
+        let hard = Stack {
+            matrix: &lin.hard.jacobian,
+            ld: lin.hard.ld(),
+            residual: &self.rate,
+        };
         // The evaluator's minors of this solve belong to the step like any other.
         if !matches!(self.qp.solve(hard, lin.hard.rows(), eval), Outcome::Failed(_)) {
             for (v, d) in out.v.iter_mut().zip(&self.qp.solution.x) {

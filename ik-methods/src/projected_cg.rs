@@ -56,7 +56,13 @@ impl ProjectedCg {
         lin.hard.add_transposed(&self.rows, -1.0, d);
         // Gradient at d₀.
         self.image.copy_from_slice(d);
-        apply(&lin.soft, damping, &mut self.soft, &self.image, &mut self.residual);
+        apply(
+            &lin.soft,
+            damping,
+            &mut self.soft,
+            &self.image,
+            &mut self.residual,
+        );
         lin.soft.add_transposed(&lin.soft.error, 1.0, &mut self.residual);
         self.project(lin);
         for (p, g) in self.direction.iter_mut().zip(&self.projected) {
@@ -68,7 +74,13 @@ impl ProjectedCg {
         let mut iterations = 0;
         while rg > goal && iterations < limit {
             iterations += 1;
-            apply(&lin.soft, damping, &mut self.soft, &self.direction, &mut self.image);
+            apply(
+                &lin.soft,
+                damping,
+                &mut self.soft,
+                &self.direction,
+                &mut self.image,
+            );
             let alpha = rg / dot(&self.direction, &self.image);
             axpy(alpha, &self.direction, d);
             axpy(alpha, &self.image, &mut self.residual);
@@ -142,7 +154,11 @@ fn solve_gram(gram: &[f64], m: usize, b: &mut [f64]) {
     for j in (0..m).rev() {
         let column = &gram[j * m..(j + 1) * m];
         let rest = dot(&column[j + 1..], &b[j + 1..m]);
-        b[j] = if column[j] > 0.0 { (b[j] - rest) / column[j] } else { 0.0 };
+        b[j] = if column[j] > 0.0 {
+            (b[j] - rest) / column[j]
+        } else {
+            0.0
+        };
     }
 }
 

@@ -174,7 +174,12 @@ pub struct Contestant {
 
 /// The registry line of `M`.
 pub const fn entry<M: Method>() -> Entry {
-    Entry { info: M::INFO, fields: M::Parameters::HELP, defaults: defaults::<M>, build: build::<M> }
+    Entry {
+        info: M::INFO,
+        fields: M::Parameters::HELP,
+        defaults: defaults::<M>,
+        build: build::<M>,
+    }
 }
 
 /// The method of that id.
@@ -182,10 +187,13 @@ pub const fn entry<M: Method>() -> Entry {
 /// # Errors
 /// [`ParameterError::UnknownMethod`], listing the known ids.
 pub fn method(id: &str) -> Result<&'static Entry, ParameterError> {
-    METHODS.iter().find(|e| e.info.id == id).ok_or_else(|| ParameterError::UnknownMethod {
-        found: id.to_owned(),
-        known: METHODS.iter().map(|e| e.info.id).collect(),
-    })
+    METHODS
+        .iter()
+        .find(|e| e.info.id == id)
+        .ok_or_else(|| ParameterError::UnknownMethod {
+            found: id.to_owned(),
+            known: METHODS.iter().map(|e| e.info.id).collect(),
+        })
 }
 
 impl Entry {
@@ -226,7 +234,11 @@ impl Entry {
             parameters.insert(key.clone(), self.checked(field, value)?);
         }
         let formulation = (self.build)(parameters.clone())?;
-        Ok(Contestant { id: self.info.id.to_owned(), parameters, formulation })
+        Ok(Contestant {
+            id: self.info.id.to_owned(),
+            parameters,
+            formulation,
+        })
     }
 
     /// `value` in the type of the field: a whole number becomes a float where floats are meant, so that the same run is
@@ -241,7 +253,9 @@ impl Entry {
             (Allowed::Whole { least, largest }, Value::Integer(v)) => {
                 (least..=largest).contains(v).then(|| value.clone())
             }
-            (Allowed::Words(words), Value::String(word)) => words.contains(&word.as_str()).then(|| value.clone()),
+            (Allowed::Words(words), Value::String(word)) => {
+                words.contains(&word.as_str()).then(|| value.clone())
+            }
             _ => None,
         };
         checked.ok_or_else(|| ParameterError::Value {
@@ -260,7 +274,10 @@ fn defaults<M: Method>() -> Table {
 fn build<M: Method>(parameters: Table) -> Result<Arc<dyn Formulation>, ParameterError> {
     let parsed: M::Parameters = parameters
         .try_into()
-        .map_err(|e: toml::de::Error| ParameterError::Rule { method: M::INFO.id, rule: e.to_string() })?;
+        .map_err(|e: toml::de::Error| ParameterError::Rule {
+            method: M::INFO.id,
+            rule: e.to_string(),
+        })?;
     parsed.validate()?;
     Ok(Arc::new(M::new(parsed)))
 }
@@ -270,7 +287,10 @@ pub(crate) const N_FIELD: Field = Field {
     key: "n",
     unit: "-",
     meaning: "most major iterations per control step",
-    allowed: Allowed::Whole { least: 1, largest: 10_000 },
+    allowed: Allowed::Whole {
+        least: 1,
+        largest: 10_000,
+    },
 };
 
 #[cfg(test)]
@@ -304,7 +324,11 @@ mod tests {
                     assert!(error.to_string().contains(field.key), "{error}");
                 }
                 assert!(entry.build(&table(field.key, Value::Boolean(true))).is_err());
-                assert!(entry.build(&table(field.key, Value::String("nonsense".into()))).is_err());
+                assert!(
+                    entry
+                        .build(&table(field.key, Value::String("nonsense".into())))
+                        .is_err()
+                );
             }
         }
     }
@@ -313,13 +337,20 @@ mod tests {
     fn ids_are_unique_and_described() {
         for (i, entry) in METHODS.iter().enumerate() {
             assert!(METHODS[..i].iter().all(|other| other.info.id != entry.info.id));
-            assert!(!entry.info.summary.is_empty() && !entry.info.source.is_empty() && !entry.info.name.is_empty());
+            assert!(
+                !entry.info.summary.is_empty()
+                    && !entry.info.source.is_empty()
+                    && !entry.info.name.is_empty()
+            );
         }
     }
 
     #[test]
     fn whole_numbers_become_floats_where_floats_are_meant() {
-        let built = method("ik4").unwrap().build(&table("gamma", Value::Integer(3))).unwrap();
+        let built = method("ik4")
+            .unwrap()
+            .build(&table("gamma", Value::Integer(3)))
+            .unwrap();
         assert_eq!(built.parameters["gamma"], Value::Float(3.0));
     }
 
@@ -327,7 +358,11 @@ mod tests {
     fn unknown_names_list_the_known_ones() {
         let error = method("ik9").unwrap_err().to_string();
         assert!(error.contains("ik9") && error.contains("ik4"));
-        let error = method("ik1").unwrap().build(&table("gamma", Value::Float(1.0))).unwrap_err().to_string();
+        let error = method("ik1")
+            .unwrap()
+            .build(&table("gamma", Value::Float(1.0)))
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("gamma") && error.contains("damping"));
     }
 }

@@ -70,11 +70,21 @@ pub(crate) struct Block {
 impl Block {
     pub(crate) fn new(rows: usize, cols: usize) -> Self {
         let ld = rows.next_multiple_of(4).max(4);
-        Self { matrix: vec![0.0; ld * cols], residual: vec![0.0; ld], motion: vec![0.0; ld], ld, rows }
+        Self {
+            matrix: vec![0.0; ld * cols],
+            residual: vec![0.0; ld],
+            motion: vec![0.0; ld],
+            ld,
+            rows,
+        }
     }
 
     pub(crate) fn stack(&self) -> Stack<'_> {
-        Stack { matrix: &self.matrix, ld: self.ld, residual: &self.residual }
+        Stack {
+            matrix: &self.matrix,
+            ld: self.ld,
+            residual: &self.residual,
+        }
     }
 
     /// Writes `residual + A d` into `motion`.
@@ -247,7 +257,8 @@ impl<M: Model> Sqp<M> {
         let target = step.targets.now();
         eval.linearise(&point.q, step.phase, target, &mut point.lin);
         eval.velocity_derivative(&mut point.lin, target, &point.dq);
-        self.model.assemble(&point.lin, &point.dq, step.dt_s, &mut point.residuals);
+        self.model
+            .assemble(&point.lin, &point.dq, step.dt_s, &mut point.residuals);
         point.half_squares = 0.5 * point.residuals.soft.residual.iter().map(|r| r * r).sum::<f64>();
         let hard = &point.residuals.hard;
         point.violation = hard.residual[..hard.rows].iter().map(|c| c.abs()).sum();
@@ -264,7 +275,11 @@ impl<M: Model> Sqp<M> {
         claim.bound.copy_from_slice(&self.qp.solution.z);
         claim.own.copy_from_slice(&self.qp.gradient);
         lin.soft.add_transposed(&lin.soft.error, -1.0, &mut claim.own);
-        let rows = lin.hard.jacobian.chunks_exact(lin.hard.ld()).zip(hard.matrix.chunks_exact(hard.ld));
+        let rows = lin
+            .hard
+            .jacobian
+            .chunks_exact(lin.hard.ld())
+            .zip(hard.matrix.chunks_exact(hard.ld));
         for (own, (plain, full)) in claim.own.iter_mut().zip(rows) {
             let difference = full.iter().zip(plain).zip(&self.qp.solution.y[..m]);
             *own -= difference.map(|((f, p), y)| (f - p) * y).sum::<f64>();

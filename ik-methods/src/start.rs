@@ -93,7 +93,12 @@ impl Escape {
                 best: vec![0.0; nv],
             })
         });
-        Self { problem: Arc::clone(problem), parameters, candidates: Vec::with_capacity(nv), scratch }
+        Self {
+            problem: Arc::clone(problem),
+            parameters,
+            candidates: Vec::with_capacity(nv),
+            scratch,
+        }
     }
 
     /// Writes the first iterate as its distance `dq` from q⁻, inside the intervals of the step.
@@ -152,7 +157,11 @@ impl Scratch {
         dq: &mut [f64],
     ) {
         self.first_program(model, step, eval, dq);
-        let alone = if candidates.len() <= MOST_CANDIDATES { candidates.len() } else { 0 };
+        let alone = if candidates.len() <= MOST_CANDIDATES {
+            candidates.len()
+        } else {
+            0
+        };
         let mut best = 0.0;
         for choice in 0..=alone {
             let moves = |i: usize| choice == alone || i == choice;
@@ -171,7 +180,13 @@ impl Scratch {
     }
 
     /// Residuals at q⁻ and the multipliers of the plain start's first program.
-    fn first_program(&mut self, model: &impl Model, step: &ControlStep<'_>, eval: &mut Evaluator, zero: &[f64]) {
+    fn first_program(
+        &mut self,
+        model: &impl Model,
+        step: &ControlStep<'_>,
+        eval: &mut Evaluator,
+        zero: &[f64],
+    ) {
         let target = step.targets.now();
         eval.linearise(step.q_prev, step.phase, target, &mut self.lin);
         eval.velocity_derivative(&mut self.lin, target, zero);
@@ -180,7 +195,8 @@ impl Scratch {
         self.qp.start(DIRECTION_WEIGHT);
         self.qp.add(self.residuals.soft.stack());
         self.qp.bound(&step.bounds, zero);
-        self.qp.solve(self.residuals.hard.stack(), self.residuals.hard.rows, eval);
+        self.qp
+            .solve(self.residuals.hard.stack(), self.residuals.hard.rows, eval);
         let m = self.residuals.hard.rows;
         self.multipliers[..m].copy_from_slice(&self.qp.solution.y[..m]);
         self.bound_multipliers.copy_from_slice(&self.qp.solution.z);
@@ -202,14 +218,20 @@ impl Scratch {
         self.qp.reset();
         self.qp.start(DIRECTION_WEIGHT);
         let soft = &self.residuals.soft;
-        self.qp.add(Stack { residual: &self.lin_zero()[..soft.ld], ..soft.stack() });
+        self.qp.add(Stack {
+            residual: &self.lin_zero()[..soft.ld],
+            ..soft.stack()
+        });
         self.qp.free();
         for (i, c) in candidates.iter().enumerate() {
             let by = if moves(i) { c.move_by } else { 0.0 };
             (self.qp.lo[c.v], self.qp.hi[c.v]) = (by, by);
         }
         let hard = &self.residuals.hard;
-        let still = Stack { residual: &self.lin_zero()[..hard.ld], ..hard.stack() };
+        let still = Stack {
+            residual: &self.lin_zero()[..hard.ld],
+            ..hard.stack()
+        };
         if self.qp.solve(still, hard.rows, eval) != crate::qp::Outcome::Solved {
             return 0.0;
         }
@@ -229,7 +251,11 @@ impl Scratch {
         let stack = &self.residuals.soft;
         let mut stretch = 0.0;
         for i in 0..stack.rows {
-            let row: f64 = p.iter().enumerate().map(|(v, p)| p * stack.matrix[v * stack.ld + i]).sum();
+            let row: f64 = p
+                .iter()
+                .enumerate()
+                .map(|(v, p)| p * stack.matrix[v * stack.ld + i])
+                .sum();
             stretch += row * row;
         }
         dot(&self.bound_multipliers, p) + 0.5 * (bending + stretch)

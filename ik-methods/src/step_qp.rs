@@ -99,7 +99,12 @@ impl StepQp {
         let qp = Qp {
             h: MatRef::new(&self.hessian, n, n),
             g: &self.gradient,
-            a: MatRef { data: hard.matrix, rows, cols: n, ld: hard.ld },
+            a: MatRef {
+                data: hard.matrix,
+                rows,
+                cols: n,
+                ld: hard.ld,
+            },
             b: &self.right[..rows],
             lo: &self.lo,
             hi: &self.hi,

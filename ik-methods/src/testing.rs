@@ -16,7 +16,10 @@ pub(crate) fn arm_problem(robot: &str, value: f64) -> (Arc<Problem>, Vec<f64>) {
     let tip = FrameId(robot.frames().len() - 1);
     let problem = Problem::new(ProblemParts {
         robot: Arc::clone(&robot),
-        tasks: vec![Task { name: "tip".into(), track: Track::Position(tip) }],
+        tasks: vec![Task {
+            name: "tip".into(),
+            track: Track::Position(tip),
+        }],
         phases: vec![Phase {
             name: "all".into(),
             tasks: vec![(0, Priority::Compromised(Weights::Uniform(1.0)))],
@@ -24,13 +27,19 @@ pub(crate) fn arm_problem(robot: &str, value: f64) -> (Arc<Problem>, Vec<f64>) {
         boundary: Boundary::None,
         objectives: vec![],
         kind: Kind::Tracking,
-        supplies: Supplies { rates: true, preview_s: 0.0 },
+        supplies: Supplies {
+            rates: true,
+            preview_s: 0.0,
+        },
         orientation: OrientationCoordinates::Log,
     })
     .unwrap();
     let mut page = ik_core::kinematics::Page::new(&robot);
     ik_core::kinematics::forward(&robot, &vec![value; robot.nq()], &mut page);
-    (Arc::new(problem), page.frame_position(&robot, tip).as_slice().to_vec())
+    (
+        Arc::new(problem),
+        page.frame_position(&robot, tip).as_slice().to_vec(),
+    )
 }
 
 /// One step of 10 ms towards the resting target `x`.

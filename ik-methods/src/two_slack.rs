@@ -24,9 +24,7 @@
 //! ## Deviations
 //! Deviation: eq. (9) prints γ εᵀ Q ε with the Q of the positions; the weighted rows of `ik_core::rows` carry √Q already.
 
-use crate::direct_position::{
-    GAMMA_FIELD, KICK_FIELD, PROXIMAL_FIELD, START_FIELD, check_start, prepared,
-};
+use crate::direct_position::{GAMMA_FIELD, KICK_FIELD, PROXIMAL_FIELD, START_FIELD, check_start, prepared};
 use crate::gauss_newton::STEP_TOLERANCE_FIELD;
 use crate::registry::{Field, Method, MethodInfo, N_FIELD, ParameterError, Parameters};
 use crate::sqp::{Model, Residuals, Sqp, SqpParameters};
@@ -58,13 +56,26 @@ pub struct TwoSlackParameters {
 
 impl Default for TwoSlackParameters {
     fn default() -> Self {
-        Self { n: 15, gamma: 10.0, start: Start::Kick, kick: 1e-2, proximal: 1e-6, step_tolerance: 1e-9 }
+        Self {
+            n: 15,
+            gamma: 10.0,
+            start: Start::Kick,
+            kick: 1e-2,
+            proximal: 1e-6,
+            step_tolerance: 1e-9,
+        }
     }
 }
 
 impl Parameters for TwoSlackParameters {
-    const HELP: &'static [Field] =
-        &[N_FIELD, GAMMA_FIELD, START_FIELD, KICK_FIELD, PROXIMAL_FIELD, STEP_TOLERANCE_FIELD];
+    const HELP: &'static [Field] = &[
+        N_FIELD,
+        GAMMA_FIELD,
+        START_FIELD,
+        KICK_FIELD,
+        PROXIMAL_FIELD,
+        STEP_TOLERANCE_FIELD,
+    ];
 
     fn validate(&self) -> Result<(), ParameterError> {
         check_start("ik5", self.start, self.kick)
@@ -99,7 +110,10 @@ impl Formulation for TwoSlack {
             SqpParameters {
                 proximal: p.proximal,
                 step_tolerance: p.step_tolerance,
-                start: StartParameters { start: p.start, kick: p.kick },
+                start: StartParameters {
+                    start: p.start,
+                    kick: p.kick,
+                },
             },
         );
         Ok(prepared(TwoSlackStepper { sqp }, p.n, true))

@@ -1,6 +1,11 @@
 //! `step` allocates nothing, for every method that says so.
 
-#![allow(clippy::unwrap_used, missing_docs, unsafe_code, reason = "a counting global allocator in a test binary")]
+#![allow(
+    clippy::unwrap_used,
+    missing_docs,
+    unsafe_code,
+    reason = "a counting global allocator in a test binary"
+)]
 
 use ik_core::boundary::Boundary;
 use ik_core::driver::{Driver, StepInput};
@@ -41,22 +46,39 @@ fn problem() -> Arc<Problem> {
     let robot = Arc::new(embedded("coman-legs").unwrap());
     let frame = |name: &str| robot.frame(name).unwrap();
     let tasks = [
-        ("com", Track::CentreOfMass, Priority::Compromised(Weights::Diagonal(vec![1.0, 2.0, 3.0]))),
+        (
+            "com",
+            Track::CentreOfMass,
+            Priority::Compromised(Weights::Diagonal(vec![1.0, 2.0, 3.0])),
+        ),
         ("left", Track::Pose(frame("l_sole")), Priority::Hard),
         ("right", Track::Pose(frame("r_sole")), Priority::Hard),
         ("torso", Track::Orientation(frame("Waist")), Priority::Hard),
     ];
     let parts = ProblemParts {
         robot: Arc::clone(&robot),
-        tasks: tasks.iter().map(|(name, track, _)| Task { name: (*name).into(), track: *track }).collect(),
+        tasks: tasks
+            .iter()
+            .map(|(name, track, _)| Task {
+                name: (*name).into(),
+                track: *track,
+            })
+            .collect(),
         phases: vec![Phase {
             name: "all".into(),
-            tasks: tasks.iter().enumerate().map(|(i, (_, _, p))| (i, p.clone())).collect(),
+            tasks: tasks
+                .iter()
+                .enumerate()
+                .map(|(i, (_, _, p))| (i, p.clone()))
+                .collect(),
         }],
         boundary: Boundary::Ellipse { margin: 0.0 },
         objectives: vec![],
         kind: Kind::Tracking,
-        supplies: Supplies { rates: true, preview_s: 0.0 },
+        supplies: Supplies {
+            rates: true,
+            preview_s: 0.0,
+        },
         orientation: OrientationCoordinates::RollPitchYaw,
     };
     Arc::new(Problem::new(parts).unwrap())
@@ -111,7 +133,12 @@ fn a_step_allocates_nothing_where_it_is_promised() {
                 let before = ALLOCATIONS.with(Cell::get);
                 driver.step(&input, majors);
                 let after = ALLOCATIONS.with(Cell::get);
-                assert_eq!(after - before, 0, "{} {variant} allocates in step {k}", contestant.id);
+                assert_eq!(
+                    after - before,
+                    0,
+                    "{} {variant} allocates in step {k}",
+                    contestant.id
+                );
                 driver.increment_into(&q, &mut v);
                 v.iter_mut().for_each(|v| *v /= 0.01);
                 q.copy_from_slice(&driver.solution().q);

@@ -2,7 +2,11 @@
 //!
 //! Objectives and KKT residuals are compared, not points: with a flat objective the point is not unique.
 
-#![allow(clippy::float_cmp, clippy::unwrap_used, reason = "exact seeds and test data")]
+#![allow(clippy::float_cmp, reason = "points are clipped onto their bounds exactly")]
+#![allow(
+    clippy::print_stdout,
+    reason = "counts of what the sweeps met, shown on request"
+)]
 
 use ik_methods::qp::{
     ActiveSet, ClarabelQp, Lexicographic, MatRef, Outcome, Qp, QpSolution, QpSolver, QpStatus, kkt_residuals,
@@ -69,13 +73,24 @@ impl Problem {
         let feasible = draw.vector(n, 1.0);
         let lo: Vec<f64> = feasible.iter().map(|x| x - draw.within(0.0, 0.6)).collect();
         let hi: Vec<f64> = feasible.iter().map(|x| x + draw.within(0.0, 0.6)).collect();
-        let mut problem = Self { n, m, h, g: draw.vector(n, 2.0), a: draw.vector(m * n, 1.0), b: vec![0.0; m], lo, hi };
+        let mut problem = Self {
+            n,
+            m,
+            h,
+            g: draw.vector(n, 2.0),
+            a: draw.vector(m * n, 1.0),
+            b: vec![0.0; m],
+            lo,
+            hi,
+        };
         problem.b = problem.rows_at(&feasible);
         (problem, feasible)
     }
 
     fn rows_at(&self, x: &[f64]) -> Vec<f64> {
-        (0..self.m).map(|r| (0..self.n).map(|j| self.a[r + j * self.m] * x[j]).sum()).collect()
+        (0..self.m)
+            .map(|r| (0..self.n).map(|j| self.a[r + j * self.m] * x[j]).sum())
+            .collect()
     }
 
     /// Row `r` becomes the combination of the rows before it.
@@ -107,10 +122,22 @@ fn agree(label: &str, seed: u64, problem: &Problem, solver: &mut ActiveSet) -> b
     let qp = problem.view();
     let mut ours = QpSolution::new(problem.n, problem.m);
     let status = solver.solve(&qp, &mut ours);
-    assert!(ours.x.iter().all(|x| x.is_finite()), "{label} {seed}: x is not finite");
-    assert_eq!(status, QpStatus::Solved, "{label} {seed}: n = {}, m = {}", problem.n, problem.m);
+    assert!(
+        ours.x.iter().all(|x| x.is_finite()),
+        "{label} {seed}: x is not finite"
+    );
+    assert_eq!(
+        status,
+        QpStatus::Solved,
+        "{label} {seed}: n = {}, m = {}",
+        problem.n,
+        problem.m
+    );
     let residuals = kkt_residuals(&qp, &ours);
-    assert!(residuals.worst_relative() < 1e-10, "{label} {seed}: {residuals:?}");
+    assert!(
+        residuals.worst_relative() < 1e-10,
+        "{label} {seed}: {residuals:?}"
+    );
     assert_eq!(residuals.bound, 0.0, "{label} {seed}: outside the box");
 
     let mut reference = QpSolution::new(problem.n, problem.m);
@@ -119,10 +146,17 @@ fn agree(label: &str, seed: u64, problem: &Problem, solver: &mut ActiveSet) -> b
     }
     let (ours, theirs) = (qp.objective(&ours.x), qp.objective(&reference.x));
     // The reference may be lower by what its own violation of the rows buys it.
-    let bought: f64 = kkt_residuals(&qp, &reference).equality * reference.y.iter().map(|y| y.abs()).sum::<f64>();
+    let bought: f64 =
+        kkt_residuals(&qp, &reference).equality * reference.y.iter().map(|y| y.abs()).sum::<f64>();
     let scale = 1.0 + ours.abs();
-    assert!(ours <= theirs + 1e-8 * scale + bought, "{label} {seed}: {ours} above the reference {theirs}");
-    assert!(ours >= theirs - 1e-6 * scale - bought, "{label} {seed}: {ours} far below the reference {theirs}");
+    assert!(
+        ours <= theirs + 1e-8 * scale + bought,
+        "{label} {seed}: {ours} above the reference {theirs}"
+    );
+    assert!(
+        ours >= theirs - 1e-6 * scale - bought,
+        "{label} {seed}: {ours} far below the reference {theirs}"
+    );
     true
 }
 
@@ -131,10 +165,19 @@ fn sweep(label: &str, count: u64, allowed_gaps: u64, make: impl Fn(&mut Draw) ->
     let mut gaps = 0;
     for seed in 0..count {
         let problem = make(&mut Draw(seed));
-        gaps += u64::from(!agree(label, seed, &problem, &mut ActiveSet::new(problem.n, problem.m)));
+        gaps += u64::from(!agree(
+            label,
+            seed,
+            &problem,
+            &mut ActiveSet::new(problem.n, problem.m),
+        ));
     }
     println!("{label}: {count} problems, reference gave up on {gaps}");
-    assert!(gaps <= allowed_gaps, "{label}: the reference solved only {} of {count}", count - gaps);
+    assert!(
+        gaps <= allowed_gaps,
+        "{label}: the reference solved only {} of {count}",
+        count - gaps
+    );
 }
 
 #[test]
@@ -162,7 +205,9 @@ fn semidefinite_with_flat_optimum() {
         let (mut problem, _) = Problem::random(draw, n, m, rows, 0.0);
         // g in the range of H: the objective is flat in the null space of J.
         let target = draw.vector(n, 1.0);
-        problem.g = (0..n).map(|i| -(0..n).map(|j| problem.h[i + j * n] * target[j]).sum::<f64>()).collect();
+        problem.g = (0..n)
+            .map(|i| -(0..n).map(|j| problem.h[i + j * n] * target[j]).sum::<f64>())
+            .collect();
         problem
     });
 }
@@ -225,16 +270,18 @@ fn degenerate_vertices() {
         let (n, m) = size(draw);
         let (mut problem, feasible) = Problem::random(draw, n, m, n + 2, 1e-2);
         // More bounds pass through the feasible point than there are degrees of freedom.
-        for j in 0..n {
+        for (j, x) in feasible.iter().enumerate() {
             match draw.index(3) {
-                0 => problem.lo[j] = feasible[j],
-                1 => problem.hi[j] = feasible[j],
+                0 => problem.lo[j] = *x,
+                1 => problem.hi[j] = *x,
                 _ => {}
             }
         }
         // Half of them have their unconstrained optimum there: all multipliers are zero.
         if draw.index(2) == 0 {
-            problem.g = (0..n).map(|i| -(0..n).map(|j| problem.h[i + j * n] * feasible[j]).sum::<f64>()).collect();
+            problem.g = (0..n)
+                .map(|i| -(0..n).map(|j| problem.h[i + j * n] * feasible[j]).sum::<f64>())
+                .collect();
         }
         problem
     });
@@ -256,10 +303,14 @@ fn ik_like(draw: &mut Draw, damping: f64, singular: f64) -> Problem {
     }
     let step: Vec<f64> = draw.vector(n, 0.02);
     let previous = draw.vector(n, 0.02);
-    for j in 0..n {
-        (problem.lo[j], problem.hi[j]) = if j < 6 { (-INF, INF) } else { (-0.02 + 0.2 * previous[j], 0.02) };
+    for (j, previous) in previous.iter().enumerate() {
+        let is_free = j < 6;
+        problem.lo[j] = if is_free { -INF } else { -0.02 + 0.2 * previous };
+        problem.hi[j] = if is_free { INF } else { 0.02 };
     }
-    let feasible: Vec<f64> = (0..n).map(|j| step[j].max(problem.lo[j]).min(problem.hi[j])).collect();
+    let feasible: Vec<f64> = (0..n)
+        .map(|j| step[j].max(problem.lo[j]).min(problem.hi[j]))
+        .collect();
     problem.b = problem.rows_at(&feasible);
     problem.g = draw.vector(n, 0.05);
     problem
@@ -273,8 +324,12 @@ fn ik_like_problems() {
 
 #[test]
 fn ik_like_problems_with_dependent_rows() {
-    sweep("IK-like, singular value 1e-16", 200, 50, |draw| ik_like(draw, 1e-2, 1e-16));
-    sweep("IK-like, singular value 0", 200, 50, |draw| ik_like(draw, 1e-6, 0.0));
+    sweep("IK-like, singular value 1e-16", 200, 50, |draw| {
+        ik_like(draw, 1e-2, 1e-16)
+    });
+    sweep("IK-like, singular value 0", 200, 50, |draw| {
+        ik_like(draw, 1e-6, 0.0)
+    });
 }
 
 /// With a singular value of 1e-9 the box decides within rounding of the rows whether there is a solution.
@@ -293,6 +348,49 @@ fn ik_like_problems_with_nearly_dependent_rows() {
     }
     println!("nearly dependent rows: {relaxed} of 500 not called solved");
     assert!(relaxed < 50);
+}
+
+/// The worst of it: nearly dependent rows met by a point on many bounds at once. Rounding of the data decides
+/// whether a solution exists; the lexicographic solver must meet the rows to rounding all the same.
+#[test]
+fn degenerate_vertices_with_nearly_dependent_rows() {
+    let (mut solved, mut relaxed) = (0, 0);
+    for seed in 0..1000 {
+        let draw = &mut Draw(seed);
+        let singular = 10f64.powf(draw.within(-15.0, -3.0));
+        let mut problem = ik_like(draw, 1e-4, singular);
+        let (n, m) = (problem.n, problem.m);
+        let middle = |j: usize| {
+            if j < 6 {
+                0.01
+            } else {
+                0.5 * (problem.lo[j] + problem.hi[j])
+            }
+        };
+        let feasible: Vec<f64> = (0..n).map(middle).collect();
+        problem.b = problem.rows_at(&feasible);
+        for (j, x) in feasible.into_iter().enumerate() {
+            match draw.index(4) {
+                0 => problem.lo[j] = x,
+                1 => problem.hi[j] = x,
+                _ => {}
+            }
+        }
+        let mut out = QpSolution::new(n, m);
+        match Lexicographic::new(n, m).solve(&problem.view(), &mut out) {
+            Outcome::Solved => solved += 1,
+            Outcome::Relaxed { residual } => {
+                assert!(residual < 1e-11, "{seed}: {residual:e}");
+                relaxed += 1;
+            }
+            Outcome::Failed(status) => panic!("{seed}: {status:?}"),
+        }
+        let residuals = kkt_residuals(&problem.view(), &out);
+        assert_eq!(residuals.bound, 0.0, "{seed}");
+        assert!(residuals.equality < 1e-11, "{seed}: {residuals:?}");
+    }
+    println!("degenerate and nearly dependent: {solved} solved, {relaxed} relaxed by less than 1e-11");
+    assert!(solved >= 900);
 }
 
 fn assert_both_infeasible(label: &str, seed: u64, problem: &Problem) {
@@ -338,7 +436,10 @@ fn empty_box() {
     let (mut problem, _) = Problem::random(&mut Draw(1), 5, 2, 5, 1.0);
     (problem.lo[3], problem.hi[3]) = (1.0, 0.5);
     let mut out = QpSolution::new(5, 2);
-    assert_eq!(ActiveSet::new(5, 2).solve(&problem.view(), &mut out), QpStatus::Infeasible);
+    assert_eq!(
+        ActiveSet::new(5, 2).solve(&problem.view(), &mut out),
+        QpStatus::Infeasible
+    );
     assert_eq!(ClarabelQp.solve(&problem.view(), &mut out), QpStatus::Infeasible);
     let outcome = Lexicographic::new(5, 2).solve(&problem.view(), &mut out);
     assert_eq!(outcome, Outcome::Failed(QpStatus::Infeasible));
@@ -346,7 +447,10 @@ fn empty_box() {
     (problem.lo[3], problem.hi[3]) = (0.5 + 1e-16, 0.5);
     problem.m = 0;
     problem.b.clear();
-    assert_eq!(ActiveSet::new(5, 0).solve(&problem.view(), &mut out), QpStatus::Solved);
+    assert_eq!(
+        ActiveSet::new(5, 0).solve(&problem.view(), &mut out),
+        QpStatus::Solved
+    );
     assert_eq!(out.x[3], 0.5);
 }
 
@@ -355,19 +459,31 @@ fn moving(seed: u64, step: usize, n: usize, m: usize) -> Problem {
     let ik = (n, m) == (18, 15);
     let at = |offset: u64| {
         let draw = &mut Draw(seed + offset);
-        if ik { ik_like(draw, 1e-2, 1.0) } else { Problem::random(draw, n, m, n / 2, 1e-2).0 }
+        if ik {
+            ik_like(draw, 1e-2, 1.0)
+        } else {
+            Problem::random(draw, n, m, n / 2, 1e-2).0
+        }
     };
     let (mut problem, other) = (at(0), at(1_000_000));
     let phase = 0.02 * step as f64;
     let blend = |a: &mut Vec<f64>, b: &[f64]| {
-        a.iter_mut().zip(b).for_each(|(a, b)| *a = if a.is_finite() { *a + phase * (b - *a) } else { *a });
+        a.iter_mut()
+            .zip(b)
+            .for_each(|(a, b)| *a = if a.is_finite() { *a + phase * (b - *a) } else { *a });
     };
     blend(&mut problem.a, &other.a);
     blend(&mut problem.g, &other.g);
     blend(&mut problem.lo, &other.lo);
     blend(&mut problem.hi, &other.hi);
     let middle: Vec<f64> = (0..n)
-        .map(|j| if problem.lo[j].is_finite() { 0.7 * problem.lo[j] + 0.3 * problem.hi[j] } else { 0.01 })
+        .map(|j| {
+            if problem.lo[j].is_finite() {
+                0.7 * problem.lo[j] + 0.3 * problem.hi[j]
+            } else {
+                0.01
+            }
+        })
         .collect();
     problem.b = problem.rows_at(&middle);
     problem
@@ -384,7 +500,11 @@ fn warm_and_cold_agree() {
                 let (mut from_warm, mut from_cold) = (QpSolution::new(n, m), QpSolution::new(n, m));
                 let warm_status = warm.solve(&problem.view(), &mut from_warm);
                 let cold_status = ActiveSet::new(n, m).solve(&problem.view(), &mut from_cold);
-                assert_eq!((warm_status, cold_status), (QpStatus::Solved, QpStatus::Solved), "{n} {m} {seed}");
+                assert_eq!(
+                    (warm_status, cold_status),
+                    (QpStatus::Solved, QpStatus::Solved),
+                    "{n} {m} {seed}"
+                );
                 let residuals = kkt_residuals(&problem.view(), &from_warm);
                 assert!(residuals.worst_relative() < 1e-10, "{residuals:?}");
                 for (a, b) in from_warm.x.iter().zip(&from_cold.x) {
@@ -397,6 +517,33 @@ fn warm_and_cold_agree() {
     }
     println!("changes of the active set: warm {warm_minors}, cold {cold_minors}");
     assert!(warm_minors < cold_minors);
+}
+
+/// A robot that comes to rest: from many active bounds to the solution zero, whose gradient vanishes too.
+#[test]
+fn warm_start_into_rest() {
+    for seed in 0..100 {
+        for (damping, m) in [(1e-2, 15), (0.0, 15), (0.0, 0)] {
+            let mut problem = ik_like(&mut Draw(seed), damping, 1.0);
+            problem.m = m;
+            problem.a.truncate(m * problem.n);
+            problem.b = vec![0.0; m];
+            problem.g.iter_mut().for_each(|g| *g *= 100.0);
+            let mut solver = ActiveSet::new(problem.n, m);
+            let mut out = QpSolution::new(problem.n, m);
+            let unbounded = damping == 0.0 && m == 0;
+            let moving = solver.solve(&problem.view(), &mut out);
+            assert!(moving == QpStatus::Solved || unbounded, "{seed}: {moving:?}");
+            problem.g.fill(0.0);
+            assert_eq!(
+                solver.solve(&problem.view(), &mut out),
+                QpStatus::Solved,
+                "{seed} {damping}"
+            );
+            let gradient = problem.view().objective(&out.x).abs().sqrt();
+            assert!(gradient < 1e-15, "{seed}: {gradient:e}");
+        }
+    }
 }
 
 /// Without a fit the residual must be the least possible one: that of the reference on (1).
@@ -420,11 +567,21 @@ fn lexicographic_finds_the_least_residual() {
 
         let fit = least_squares(&problem);
         let mut reference = QpSolution::new(n, 0);
-        assert_eq!(ClarabelQp.solve(&fit.view(), &mut reference), QpStatus::Solved, "{seed}");
+        assert_eq!(
+            ClarabelQp.solve(&fit.view(), &mut reference),
+            QpStatus::Solved,
+            "{seed}"
+        );
         let least = norm(&difference(&problem.rows_at(&reference.x), &problem.b));
-        assert!((residual - least).abs() < 1e-6, "{seed}: {residual}, reference {least}");
+        assert!(
+            (residual - least).abs() < 1e-6,
+            "{seed}: {residual}, reference {least}"
+        );
         let reached = norm(&difference(&problem.rows_at(&out.x), &problem.b));
-        assert!((residual - reached).abs() < 1e-10, "{seed}: claims {residual}, has {reached}");
+        assert!(
+            (residual - reached).abs() < 1e-10,
+            "{seed}: claims {residual}, has {reached}"
+        );
 
         // (2): no point with the same rows may be better by more than rounding.
         let mut met = problem.clone();
@@ -446,7 +603,14 @@ fn least_squares(problem: &Problem) -> Problem {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let h = gram(&problem.a, m, n);
     let g = (0..n).map(|j| -dot(column(j), &problem.b)).collect();
-    Problem { h, g, m: 0, a: Vec::new(), b: Vec::new(), ..problem.clone() }
+    Problem {
+        h,
+        g,
+        m: 0,
+        a: Vec::new(),
+        b: Vec::new(),
+        ..problem.clone()
+    }
 }
 
 fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
@@ -473,9 +637,17 @@ fn bad_input_is_reported_and_never_spreads() {
     for (case, spoil) in spoil.iter().enumerate() {
         let mut bad = good.clone();
         spoil(&mut bad);
-        assert_eq!(solver.solve(&bad.view(), &mut out), QpStatus::Numerical, "case {case}");
+        assert_eq!(
+            solver.solve(&bad.view(), &mut out),
+            QpStatus::Numerical,
+            "case {case}"
+        );
         assert!(out.x.iter().all(|x| x.is_finite()), "case {case}");
-        assert_eq!(solver.solve(&good.view(), &mut out), QpStatus::Solved, "after case {case}");
+        assert_eq!(
+            solver.solve(&good.view(), &mut out),
+            QpStatus::Solved,
+            "after case {case}"
+        );
     }
 }
 
@@ -494,7 +666,10 @@ fn unbounded_objective_is_numerical() {
     };
     problem.h[0] = 1.0;
     let mut out = QpSolution::new(n, 0);
-    assert_eq!(ActiveSet::new(n, 0).solve(&problem.view(), &mut out), QpStatus::Numerical);
+    assert_eq!(
+        ActiveSet::new(n, 0).solve(&problem.view(), &mut out),
+        QpStatus::Numerical
+    );
     assert!(out.x.iter().all(|x| x.is_finite()));
 }
 

@@ -10,9 +10,9 @@ pub(super) fn list(what: Listed, out: &mut dyn Write) -> io::Result<()> {
     match what {
         Listed::Methods => METHODS.iter().try_for_each(|entry| method(entry, out)),
         Listed::Suites => suites(out),
-        Listed::Robots => {
-            EMBEDDED.iter().try_for_each(|robot| writeln!(out, "{:<26} {}", robot.id, robot.summary))
-        }
+        Listed::Robots => EMBEDDED
+            .iter()
+            .try_for_each(|robot| writeln!(out, "{:<26} {}", robot.id, robot.summary)),
     }
 }
 
@@ -23,8 +23,14 @@ fn method(entry: &Entry, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "    {}", info.source)?;
     let defaults = entry.defaults();
     for field in entry.fields() {
-        let default = defaults.get(field.key).map_or_else(String::new, ToString::to_string);
-        writeln!(out, "    --set {}={default}   [{}] {}; {}", field.key, field.unit, field.meaning, field.allowed)?;
+        let default = defaults
+            .get(field.key)
+            .map_or_else(String::new, ToString::to_string);
+        writeln!(
+            out,
+            "    --set {}={default}   [{}] {}; {}",
+            field.key, field.unit, field.meaning, field.allowed
+        )?;
     }
     writeln!(out)
 }

@@ -129,7 +129,12 @@ struct RunArgs {
 
 impl RunArgs {
     fn variation(&self) -> Variation {
-        Variation { dt_s: self.dt, velocity: self.velocity, margin: self.margin, rates: self.rates }
+        Variation {
+            dt_s: self.dt,
+            velocity: self.velocity,
+            margin: self.margin,
+            rates: self.rates,
+        }
     }
 }
 
@@ -147,7 +152,9 @@ struct SolveArgs {
 
 fn rates(word: &str) -> Result<Rates, String> {
     let found = Rates::WORDS.iter().find(|(known, _)| *known == word);
-    found.map(|(_, rates)| *rates).ok_or_else(|| "allowed: analytic, difference, zero".to_owned())
+    found
+        .map(|(_, rates)| *rates)
+        .ok_or_else(|| "allowed: analytic, difference, zero".to_owned())
 }
 
 /// Reads the command line, does what it says, and tells how it went.
@@ -176,7 +183,12 @@ fn dispatch(cli: &Cli, out: &mut dyn Write) -> Result<(), Failure> {
         Some(Command::Readme { dir, readme }) => {
             let rows = rows_of(dir)?;
             summary::replace_readme_table(readme, &rows)?;
-            Ok(writeln!(out, "{}: table of {} rows", readme.display(), rows.len())?)
+            Ok(writeln!(
+                out,
+                "{}: table of {} rows",
+                readme.display(),
+                rows.len()
+            )?)
         }
     }
 }
@@ -190,7 +202,12 @@ fn draw(dir: &Path, out: &mut dyn Write) -> Result<(), Failure> {
     for note in &drawn.notes {
         writeln!(out, "note: {note}")?;
     }
-    Ok(writeln!(out, "{} figures in {}", drawn.files.len(), dir.join("figures").display())?)
+    Ok(writeln!(
+        out,
+        "{} figures in {}",
+        drawn.files.len(),
+        dir.join("figures").display()
+    )?)
 }
 
 #[cfg(test)]

@@ -26,7 +26,10 @@ pub(super) fn heats(
         for (index, scenario) in suite.scenarios.iter().enumerate() {
             if scenarios == Scenarios::All || scenario.quick || !marked {
                 let case = Case::new(suite, index, variation)?;
-                heats.push(Heat { case, contestants: contestants.clone() });
+                heats.push(Heat {
+                    case,
+                    contestants: contestants.clone(),
+                });
             }
         }
     }
@@ -51,7 +54,12 @@ pub(super) fn settings(options: &[String]) -> Result<Table, InputError> {
         let value = parsed.ok().and_then(|mut t| t.remove("value"));
         let value = value.unwrap_or_else(|| Value::String(text.trim().to_owned()));
         if table.insert(key.trim().to_owned(), value).is_some() {
-            return Err(InputError::value("command line", "--set", option, "each key once; n=[15,3] for several values"));
+            return Err(InputError::value(
+                "command line",
+                "--set",
+                option,
+                "each key once; n=[15,3] for several values",
+            ));
         }
     }
     Ok(table)

@@ -20,7 +20,8 @@ impl Progress {
     }
 
     pub(super) fn pass_done(&self, case: &Case, contestant: &Contestant) {
-        self.bar.set_message(format!("{} on {}/{}", contestant.id, case.suite, case.scenario));
+        self.bar
+            .set_message(format!("{} on {}/{}", contestant.id, case.suite, case.scenario));
         self.bar.inc(1);
     }
 

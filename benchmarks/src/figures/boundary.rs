@@ -1,11 +1,12 @@
 //! Figure 5 of the paper: the knee in the position–velocity plane under an ellipse, a polygon, and without regulator.
 
 use super::axis::Axis;
+use super::figure::{Figure, PanelRow};
 use super::labels::Labelled;
-use super::panel::{Curve, Figure, Markers, Panel, PanelRow, time_axis};
+use super::panel::{Curve, Markers, Panel, time_axis};
 use super::style::{BLACK, BLUE, Dash, GREEN, GREY, Marker, Style, VERMILLION};
 use super::tracking::reference_curve;
-use super::{Points, DrawnLimits, Obstacle, Studio, Traced, milliseconds, over_time, rate_over_time};
+use super::{DrawnLimits, Obstacle, Points, Studio, Traced, milliseconds, over_time, rate_over_time};
 use std::f64::consts::TAU;
 
 const SUITE: &str = "coman/boundary";
@@ -42,33 +43,27 @@ pub(super) fn boundary(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
         .map(|v| plane(v, &limits))
         .collect();
     let rows = vec![
-        PanelRow {
-            height: 400.0,
-            panels: planes,
-        },
-        PanelRow {
-            height: 250.0,
-            panels: vec![height(&main), knee(&main)],
-        },
+        PanelRow::new(400.0, planes),
+        PanelRow::new(250.0, vec![height(&main), knee(&main)]),
     ];
     let dt = milliseconds(run.row.dt_s);
     let title = format!("Fig. 5  Boundary and regulator: {SUITE} and {REGULATOR} with γ = 0, Δt = {dt} ms");
-    let remarks = vec![format!(
-        "Ellipse: {} … {} rad, {} rad/s. Polygon: κ = {} 1/s, v₀ = {} rad/s. Velocity Δq/Δt of the left knee; eq. (6) bounds it \
-         at the angle after the step.",
-        limits.knee_rad.0,
-        limits.knee_rad.1,
-        limits.velocity_rad_s,
-        limits.polygon_slope_per_s,
-        limits.polygon_exit_velocity_rad_s
-    )];
-    Ok(Figure {
-        title,
-        rows,
-        remarks,
-        keys: Vec::new(),
-    }
-    .render()?)
+    Ok(Figure::new(title, rows)
+        .with_remarks(vec![meaning(&limits)])
+        .render()?)
+}
+
+fn meaning(limits: &DrawnLimits) -> String {
+    let DrawnLimits {
+        knee_rad: (low, high),
+        velocity_rad_s: speed,
+        ..
+    } = limits;
+    let (slope, exit) = (limits.polygon_slope_per_s, limits.polygon_exit_velocity_rad_s);
+    format!(
+        "Ellipse: {low} … {high} rad, {speed} rad/s. Polygon: κ = {slope} 1/s, v₀ = {exit} rad/s. Velocity: Δq/Δt of the left \
+         knee, drawn at the angle after the step, where eq. (6) bounds it."
+    )
 }
 
 fn variants<'a>(studio: &mut Studio<'a>, method: &str) -> Result<Vec<Variant<'a>>, Obstacle> {
@@ -88,6 +83,7 @@ fn variants<'a>(studio: &mut Studio<'a>, method: &str) -> Result<Vec<Variant<'a>
     let mut found = Vec::new();
     for (name, style, run) in wanted {
         let traced = studio.with_traces(run.into_iter().collect())?;
+        studio.require("com_z", &traced);
         found.extend(traced.into_iter().map(|traced| Variant { name, style, traced }));
     }
     Ok(found)

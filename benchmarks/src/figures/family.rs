@@ -1,6 +1,6 @@
 //! The family of asymmetric squats as a matrix: which method survives which scenario, with its largest error.
 
-use super::labels::Labelled;
+use super::labels::{Labelled, by_method};
 use super::sheet::{Anchor, Drawing, Point, Sheet, Stroke, Type, WIDTH, draw};
 use super::style::{BLACK, Dash, GREEN, GREY, PALE, VERMILLION, WHITE};
 use super::{Obstacle, Studio, milliseconds};
@@ -10,7 +10,7 @@ const SUITE: &str = "coman/asymmetric";
 /// Scenario of the suite that has a figure of its own.
 const APART: &str = "C";
 const LEFT: f64 = 150.0;
-const TOP: f64 = 92.0;
+const TOP: f64 = 104.0;
 const CELL_HEIGHT: f64 = 30.0;
 const WIDEST_CELL: f64 = 78.0;
 /// Tints of the cells: the palette's colours on white, pale enough for black text.
@@ -36,30 +36,25 @@ pub(super) fn survival(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
 }
 
 struct Matrix<'a> {
-    runs: &'a [Labelled<'a>],
     scenarios: Vec<&'a str>,
-    /// (label, n).
-    methods: Vec<(String, Option<u64>)>,
+    /// Runs of each method, one column each.
+    methods: Vec<Vec<&'a Labelled<'a>>>,
 }
 
 impl<'a> Matrix<'a> {
     fn new(runs: &'a [Labelled<'a>]) -> Self {
         let mut scenarios: Vec<&str> = Vec::new();
-        let mut methods: Vec<(String, Option<u64>)> = Vec::new();
+
         for run in runs {
             if !scenarios.contains(&run.row.scenario.as_str()) {
                 scenarios.push(&run.row.scenario);
             }
-            let method = (run.label.clone(), run.n);
-            if !methods.contains(&method) {
-                methods.push(method);
-            }
         }
-        methods.sort_by_key(|(label, n)| (label.clone(), std::cmp::Reverse(*n)));
+        // The halves of the family one below the other: what stands last in an id is the period of the roll.
+        scenarios.sort_by_key(|s| std::cmp::Reverse(s.rsplit('_').next()));
         Self {
-            runs,
             scenarios,
-            methods,
+            methods: by_method(runs),
         }
     }
 
@@ -74,17 +69,14 @@ impl<'a> Matrix<'a> {
         sheet.text(&title, (12.0, 22.0), look(15.0, Anchor::Left, BLACK))?;
         let explanation = "Largest CoM error (mm).  Tick: survived.  Cross: lost.  – : declined or not run.";
         sheet.text(explanation, (12.0, 44.0), look(12.0, Anchor::Left, GREY))?;
-        for (column, (label, n)) in self.methods.iter().enumerate() {
+        for (column, runs) in self.methods.iter().enumerate() {
             let x = LEFT + (column as f64 + 0.5) * self.cell_width();
-            let (name, variant) = label.split_once([' ', '-']).unwrap_or((label, ""));
-            let budget = n.map_or(String::new(), |n| format!("n={n}"));
-            let second = [variant, &budget]
-                .into_iter()
-                .filter(|s| !s.is_empty())
-                .collect::<Vec<_>>()
-                .join(" ");
-            sheet.text(name, (x, TOP - 26.0), look(11.0, Anchor::Centre, BLACK))?;
-            sheet.text(&second, (x, TOP - 11.0), look(10.0, Anchor::Centre, BLACK))?;
+            let name = runs[0].full();
+            let lines = broken(&name);
+            for (index, line) in lines.iter().enumerate() {
+                let y = TOP - 11.0 - 13.0 * (lines.len() - 1 - index) as f64;
+                sheet.text(line, (x, y), look(10.5, Anchor::Centre, BLACK))?;
+            }
         }
         for (index, scenario) in self.scenarios.iter().enumerate() {
             let y = TOP + (index as f64 + 0.5) * CELL_HEIGHT;
@@ -96,21 +88,16 @@ impl<'a> Matrix<'a> {
 
     fn cells(&self, sheet: &Sheet<'_>) -> Drawing {
         for (row, scenario) in self.scenarios.iter().enumerate() {
-            for (column, method) in self.methods.iter().enumerate() {
+            for (column, runs) in self.methods.iter().enumerate() {
                 let corner = (
                     LEFT + column as f64 * self.cell_width(),
                     TOP + row as f64 * CELL_HEIGHT,
                 );
-                self.cell(sheet, corner, self.find(scenario, method))?;
+                let run = runs.iter().copied().find(|r| r.row.scenario == *scenario);
+                self.cell(sheet, corner, run)?;
             }
         }
         Ok(())
-    }
-
-    fn find(&self, scenario: &str, method: &(String, Option<u64>)) -> Option<&Labelled<'_>> {
-        self.runs
-            .iter()
-            .find(|r| r.row.scenario == scenario && r.label == method.0 && r.n == method.1)
     }
 
     fn cell(&self, sheet: &Sheet<'_>, (x, y): Point, run: Option<&Labelled<'_>>) -> Drawing {
@@ -128,7 +115,8 @@ impl<'a> Matrix<'a> {
         let Some(quality) = quality else {
             return sheet.text("–", text_at, look);
         };
-        symbol(sheet, (x + 13.0, y + CELL_HEIGHT / 2.0), quality.survived)?;
+        let symbol = if quality.survived { tick } else { cross };
+        symbol(sheet, (x + 13.0, y + CELL_HEIGHT / 2.0))?;
         let error = quality
             .com_error_max_m
             .map_or("–".to_owned(), |e| millimetres(e * 1e3));
@@ -144,12 +132,9 @@ impl<'a> Matrix<'a> {
             colour: BLACK,
         };
         sheet.text("survived", (LEFT - 8.0, y), look(Anchor::Right))?;
-        for (column, (label, n)) in self.methods.iter().enumerate() {
-            let of_method = self.runs.iter().filter(|r| r.label == *label && r.n == *n);
-            let metrics: Vec<bool> = of_method
-                .map(|r| r.row.metrics.as_ref().is_some_and(|m| m.quality.survived))
-                .collect();
-            let sum = format!("{}/{}", metrics.iter().filter(|s| **s).count(), metrics.len());
+        for (column, runs) in self.methods.iter().enumerate() {
+            let survived = |r: &&&Labelled<'_>| r.row.metrics.as_ref().is_some_and(|m| m.quality.survived);
+            let sum = format!("{}/{}", runs.iter().filter(survived).count(), runs.len());
             sheet.text(
                 &sum,
                 (LEFT + (column as f64 + 0.5) * self.cell_width(), y),
@@ -160,6 +145,18 @@ impl<'a> Matrix<'a> {
     }
 }
 
+/// A name in lines of at most about ten characters, broken after blanks and hyphens.
+fn broken(name: &str) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for piece in name.split_inclusive([' ', '-']) {
+        match lines.last_mut() {
+            Some(line) if line.len() + piece.trim_end().len() <= 9 => line.push_str(piece),
+            _ => lines.push(piece.to_owned()),
+        }
+    }
+    lines
+}
+
 fn millimetres(value: f64) -> String {
     match value {
         v if v < 100.0 => format!("{v:.1}"),
@@ -168,19 +165,23 @@ fn millimetres(value: f64) -> String {
     }
 }
 
-/// A tick or a cross, drawn as lines: not every font has the signs.
-fn symbol(sheet: &Sheet<'_>, (x, y): Point, survived: bool) -> Drawing {
-    let stroke = |colour| Stroke {
-        colour,
+/// A tick, drawn as a line: not every font has the sign.
+fn tick(sheet: &Sheet<'_>, (x, y): Point) -> Drawing {
+    let stroke = Stroke {
+        colour: GREEN,
         width: 2.0,
         dash: Dash::Solid,
     };
-    if survived {
-        return sheet.line(
-            &[(x - 5.0, y), (x - 1.5, y + 4.0), (x + 5.0, y - 5.0)],
-            stroke(GREEN),
-        );
-    }
-    sheet.line(&[(x - 4.0, y - 4.0), (x + 4.0, y + 4.0)], stroke(VERMILLION))?;
-    sheet.line(&[(x - 4.0, y + 4.0), (x + 4.0, y - 4.0)], stroke(VERMILLION))
+    sheet.line(&[(x - 5.0, y), (x - 1.5, y + 4.0), (x + 5.0, y - 5.0)], stroke)
+}
+
+/// A cross, drawn as lines.
+fn cross(sheet: &Sheet<'_>, (x, y): Point) -> Drawing {
+    let stroke = Stroke {
+        colour: VERMILLION,
+        width: 2.0,
+        dash: Dash::Solid,
+    };
+    sheet.line(&[(x - 4.0, y - 4.0), (x + 4.0, y + 4.0)], stroke)?;
+    sheet.line(&[(x - 4.0, y + 4.0), (x + 4.0, y - 4.0)], stroke)
 }

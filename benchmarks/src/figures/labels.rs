@@ -26,6 +26,19 @@ impl Labelled<'_> {
         }
     }
 
+    /// Place among the methods of a table: by label, numbers in it by value, then by falling n.
+    pub(crate) fn order(&self) -> (Vec<(String, u64)>, std::cmp::Reverse<Option<u64>>) {
+        (
+            self.label.split(' ').map(sortable).collect(),
+            std::cmp::Reverse(self.n),
+        )
+    }
+
+    /// Whether two rows are of the same method, variant and budget.
+    pub(crate) fn is_same_method(&self, other: &Self) -> bool {
+        self.label == other.label && self.n == other.n
+    }
+
     /// Parameter γ of the velocity term.
     pub(crate) fn gamma(&self) -> Option<f64> {
         self.row.parameters.get("gamma").and_then(Value::as_f64)
@@ -45,9 +58,37 @@ pub(crate) fn labelled(rows: &[Row]) -> Vec<Labelled<'_>> {
     let suite_order = |row: &Row| rows.iter().position(|r| r.suite == row.suite);
     named.sort_by_cached_key(|l| {
         let place = order[&(l.row.suite.as_str(), l.row.scenario.as_str())];
-        (suite_order(l.row), place, l.label.clone(), std::cmp::Reverse(l.n))
+        (suite_order(l.row), place, l.order())
     });
     named
+}
+
+/// The runs grouped by method, variant and budget, in the order of tables.
+pub(crate) fn by_method<'r, 'a>(
+    runs: impl IntoIterator<Item = &'r Labelled<'a>>,
+) -> Vec<Vec<&'r Labelled<'a>>>
+where
+    'a: 'r,
+{
+    let mut groups: Vec<Vec<&'r Labelled<'a>>> = Vec::new();
+    for run in runs {
+        match groups.iter_mut().find(|g| g[0].is_same_method(run)) {
+            Some(group) => group.push(run),
+            None => groups.push(vec![run]),
+        }
+    }
+    groups.sort_by_cached_key(|g| g[0].order());
+    groups
+}
+
+/// A word of a label, a number after `=` apart. The bits of a non-negative f64 sort like its value.
+fn sortable(word: &str) -> (String, u64) {
+    let parsed = word
+        .split_once('=')
+        .and_then(|(key, value)| Some((key, value.parse::<f64>().ok()?)));
+    parsed.map_or((word.to_owned(), 0), |(key, value)| {
+        (key.to_owned(), value.max(0.0).to_bits())
+    })
 }
 
 fn last_of_each(rows: &[Row]) -> Vec<&Row> {
@@ -82,7 +123,7 @@ fn name<'a>(row: &'a Row, rows: &[&Row]) -> Labelled<'a> {
         }
     }
     if rivals.iter().any(|r| r.dt_s.to_bits() != row.dt_s.to_bits()) {
-        label.push_str(&format!(" dt={}ms", row.dt_s * 1e3));
+        label.push_str(&format!(" dt={} ms", super::milliseconds(row.dt_s)));
     }
     Labelled {
         row,
@@ -92,5 +133,68 @@ fn name<'a>(row: &'a Row, rows: &[&Row]) -> Labelled<'a> {
 }
 
 fn plain(value: &Value) -> String {
-    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+    match (value.as_str(), value.as_f64()) {
+        (Some(word), _) => word.to_owned(),
+        // 10, not 10.0.
+        (None, Some(number)) => number.to_string(),
+        (None, None) => value.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::row;
+    use super::*;
+
+    fn with(mut row: Row, key: &str, value: impl Into<Value>) -> Row {
+        row.parameters.insert(key.to_owned(), value.into());
+        row
+    }
+
+    #[test]
+    fn labels_tell_variants_apart_and_sort_numbers_by_value() {
+        let squat = || row("ik4", Some(15), "coman/squat", "A");
+        let rows = [
+            with(squat(), "gamma", 100.0),
+            with(squat(), "gamma", 3.0),
+            with(squat(), "rows", "literal"),
+            row("ik1", None, "coman/squat", "A"),
+        ];
+        let names: Vec<String> = labelled(&rows).iter().map(Labelled::full).collect();
+        let expected = [
+            "ik1",
+            "ik4 gamma=3 n=15",
+            "ik4 gamma=100 n=15",
+            "ik4 literal gamma=10 n=15",
+        ];
+        assert_eq!(names, expected);
+    }
+
+    #[test]
+    fn of_equal_runs_the_last_counts_and_the_larger_budget_comes_first() {
+        let newer = Row {
+            revision: "newer".to_owned(),
+            ..row("ik5", Some(3), "coman/squat", "A")
+        };
+        let rows = [
+            row("ik5", Some(3), "coman/squat", "A"),
+            row("ik5", Some(15), "coman/squat", "A"),
+            newer,
+        ];
+        let runs = labelled(&rows);
+        assert_eq!(runs.iter().map(|r| r.n).collect::<Vec<_>>(), [Some(15), Some(3)]);
+        assert_eq!(runs[1].row.revision, "newer");
+        assert_eq!(runs[1].label, "ik5");
+    }
+
+    #[test]
+    fn time_steps_are_told_apart() {
+        let coarse = Row {
+            dt_s: 0.01,
+            ..row("ik1", None, "coman/squat", "A")
+        };
+        let rows = [row("ik1", None, "coman/squat", "A"), coarse];
+        let names: Vec<String> = labelled(&rows).iter().map(Labelled::full).collect();
+        assert_eq!(names, ["ik1 dt=5 ms", "ik1 dt=10 ms"]);
+    }
 }

@@ -7,9 +7,11 @@
 mod axis;
 mod boundary;
 mod family;
+mod figure;
 pub(crate) mod labels;
 mod lean;
 mod overview;
+mod painter;
 mod panel;
 mod posture;
 mod regulator;
@@ -20,6 +22,7 @@ mod tracking;
 use crate::records::{Row, Trace};
 use crate::records_io::{ROWS_FILE, RecordError, read_rows, read_trace, write_atomically};
 use labels::{Labelled, labelled};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use style::Styles;
 
@@ -59,7 +62,10 @@ pub struct DrawnLimits {
 
 impl DrawnLimits {
     /// Coman with the knee limited at its singularity, Table I of the paper, and our polygon.
-    #[allow(clippy::approx_constant, reason = "the limit in the robot's table, not a fraction of pi")]
+    #[allow(
+        clippy::approx_constant,
+        reason = "the limit in the robot's table, not a fraction of pi"
+    )]
     pub const COMAN: Self = Self {
         knee_rad: (0.0, 1.9199),
         hip_pitch_rad: (-1.9199, 0.7854),
@@ -85,8 +91,8 @@ pub struct Drawn {
 /// # Errors
 /// [`FigureError`]; figures drawn before the error stay.
 pub fn draw_all(dir: &Path, limits: &DrawnLimits) -> Result<Drawn, FigureError> {
-    let rows = read_rows(&dir.join(ROWS_FILE))?.rows;
-    let runs = of_last_dt(labelled(&rows));
+    let rows = of_last_dt(read_rows(&dir.join(ROWS_FILE))?.rows);
+    let runs = labelled(&rows);
     let styles = Styles::assign(runs.iter().map(|r| r.label.as_str()));
     let mut studio = Studio {
         dir,
@@ -116,7 +122,7 @@ pub fn draw_all(dir: &Path, limits: &DrawnLimits) -> Result<Drawn, FigureError> 
             }
         }
     }
-    studio.notes.dedup();
+
     Ok(Drawn {
         files,
         notes: studio.notes,
@@ -193,6 +199,17 @@ impl<'a> Studio<'a> {
         self.runs.iter().filter(here).cloned().collect()
     }
 
+    /// Suites, in the order of their first rows.
+    fn suites(&self) -> Vec<&'a str> {
+        let mut suites: Vec<&str> = Vec::new();
+        for run in &self.runs {
+            if !suites.contains(&run.row.suite.as_str()) {
+                suites.push(&run.row.suite);
+            }
+        }
+        suites
+    }
+
     /// Runs of a suite.
     fn runs_of_suite(&self, suite: &str) -> Vec<Labelled<'a>> {
         self.runs
@@ -226,33 +243,42 @@ impl<'a> Studio<'a> {
         read_trace(&path).map(|t| (!t.rows.is_empty()).then_some(t))
     }
 
+    /// Notes how many traces lack a column.
+    fn require(&mut self, column: &str, traced: &[Traced<'a>]) {
+        let without: Vec<&Traced<'a>> = traced
+            .iter()
+            .filter(|t| !t.trace.columns.iter().any(|c| c == column))
+            .collect();
+        if let [first, ..] = without[..] {
+            let (row, count, all) = (first.run.row, without.len(), traced.len());
+            self.note(format!(
+                "{}/{}: {count} of {all} traces have no column {column}",
+                row.suite, row.scenario
+            ));
+        }
+    }
+
     fn miss(&mut self, run: &Labelled<'_>, reason: &str) {
-        self.notes.push(format!(
+        self.note(format!(
             "{} on {}/{}: {reason}",
             run.full(),
             run.row.suite,
             run.row.scenario
         ));
     }
+
+    fn note(&mut self, note: String) {
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
 }
 
-/// Keeps, per suite, the runs with the Δt of the last row.
-fn of_last_dt(runs: Vec<Labelled<'_>>) -> Vec<Labelled<'_>> {
-    let last_dt = |suite: &str| {
-        runs.iter()
-            .rev()
-            .find(|l| l.row.suite == suite)
-            .map(|l| l.row.dt_s.to_bits())
-    };
-    let keep: Vec<bool> = runs
-        .iter()
-        .map(|l| last_dt(&l.row.suite) == Some(l.row.dt_s.to_bits()))
-        .collect();
-    runs.into_iter()
-        .zip(keep)
-        .filter(|(_, k)| *k)
-        .map(|(l, _)| l)
-        .collect()
+/// Keeps, per suite, the rows with the Δt of the last one.
+fn of_last_dt(mut rows: Vec<Row>) -> Vec<Row> {
+    let last: BTreeMap<String, u64> = rows.iter().map(|r| (r.suite.clone(), r.dt_s.to_bits())).collect();
+    rows.retain(|r| last.get(&r.suite) == Some(&r.dt_s.to_bits()));
+    rows
 }
 
 /// Points of a curve: (time, value) or (abscissa, ordinate).

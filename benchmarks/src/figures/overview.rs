@@ -1,16 +1,20 @@
 //! Overviews: one panel per suite, one line per method, one mark per scenario, on a common axis.
 
-use super::axis::{Axis, Scale};
-use super::labels::Labelled;
-use super::panel::{Curve, Dot, Figure, Markers, Panel, PanelRow, Remark};
+use super::axis::Axis;
+use super::figure::{Figure, PanelRow};
+use super::labels::{Labelled, by_method};
+use super::panel::{Curve, Dot, Markers, Panel, Remark};
+use super::sheet::{Key, Shows};
 use super::style::{BLACK, Dash, GREY, Marker, Style, VERMILLION};
-use super::{Obstacle, Studio};
+use super::{Obstacle, Points, Studio};
 use crate::records::Metrics;
 use crate::statistics::median;
 
 /// Height of a line and of the rest of a panel.
 const LINE: f64 = 17.0;
-const REST: f64 = 66.0;
+const REST: f64 = 76.0;
+/// Factor by which the axis goes beyond its round ends.
+const MARGIN: f64 = 1.15;
 
 type Metric = fn(&Metrics) -> Option<f64>;
 
@@ -54,86 +58,77 @@ pub(super) fn hard(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
     )
 }
 
-fn overview(studio: &mut Studio<'_>, title: &str, label: &str, metric: Metric) -> Result<String, Obstacle> {
-    let mut suites: Vec<&str> = Vec::new();
-    for run in &studio.runs {
-        if !suites.contains(&run.row.suite.as_str()) {
-            suites.push(&run.row.suite);
-        }
-    }
-    let values: Vec<f64> = studio
-        .runs
-        .iter()
-        .filter_map(|r| metric(r.row.metrics.as_ref()?))
-        .filter(|v| v.is_finite())
-        .collect();
-    if values.is_empty() {
-        return Err(Obstacle::NoData("no run has this metric".to_owned()));
-    }
-    let common = Axis::log(label).fit(&[values], 8);
-    let axis = Axis::log(label).with_range(common.low, common.high);
-    let panels: Vec<(usize, Panel)> = suites
-        .iter()
-        .map(|s| suite_panel(s, &studio.runs_of_suite(s), &axis, metric))
-        .collect();
-    let rows = panels.chunks(2).map(|pair| PanelRow {
-        height: REST + LINE * pair.iter().map(|p| p.0).max().unwrap_or_default() as f64,
-        panels: pair.iter().map(|p| p.1.clone()).collect(),
+fn overview(studio: &Studio<'_>, title: &str, label: &str, metric: Metric) -> Result<String, Obstacle> {
+    let axis = common_axis(studio, label, metric)?;
+    let suites = studio.suites();
+    let rows = suites.chunks(2).map(|pair| {
+        let runs: Vec<Vec<Labelled<'_>>> = pair.iter().map(|s| studio.runs_of_suite(s)).collect();
+        let lines = runs.iter().map(|r| by_method(r).len()).max().unwrap_or_default();
+        let panels = pair
+            .iter()
+            .zip(&runs)
+            .map(|(s, r)| suite_panel(s, r, &axis, lines, metric));
+        PanelRow::new(REST + LINE * lines as f64, panels.collect())
     });
-    let key = |name: &str, colour, marker| {
-        (
-            name.to_owned(),
-            Style {
-                colour,
-                dash: Dash::Solid,
-                marker,
-            },
-        )
-    };
-    let figure = Figure {
-        title: format!("{title}, all suites"),
-        rows: rows.collect(),
-        remarks: vec!["One mark per scenario; the line spans them, the bar is their median.".to_owned()],
-        keys: vec![
-            key("survived", BLACK, Marker::Circle),
-            key("did not survive", VERMILLION, Marker::Cross),
-        ],
-    };
+    let remark = "One mark per scenario; the line spans them, the bar is their median.";
+    let mut figure =
+        Figure::new(format!("{title}, all suites"), rows.collect()).with_remarks(vec![remark.to_owned()]);
+    let keys = [("survived", SURVIVED), ("did not survive", LOST)];
+    figure.keys = keys
+        .map(|(name, style)| Key {
+            name: name.to_owned(),
+            style,
+            shows: Shows::Marker,
+        })
+        .to_vec();
     Ok(figure.render()?)
 }
 
-/// The panel and its number of lines.
-fn suite_panel(suite: &str, runs: &[Labelled<'_>], axis: &Axis, metric: Metric) -> (usize, Panel) {
-    let mut lines: Vec<(String, Option<u64>)> = Vec::new();
-    for run in runs {
-        let line = (run.label.clone(), run.n);
-        if !lines.contains(&line) {
-            lines.push(line);
-        }
+/// The axis on which all values of the metric lie.
+fn common_axis(studio: &Studio<'_>, label: &str, metric: Metric) -> Result<Axis, Obstacle> {
+    let values = studio.runs.iter().filter_map(|r| metric(r.row.metrics.as_ref()?));
+    // One curve per value: a logarithmic axis may cut the low end of a curve.
+    let values: Vec<Vec<f64>> = values.map(|v| vec![v]).collect();
+    if values.is_empty() {
+        return Err(Obstacle::NoData("no run has this metric".to_owned()));
     }
-    lines.sort_by_key(|(label, n)| (label.clone(), std::cmp::Reverse(*n)));
-    let count = lines.len();
-    let height = |index: usize| (count - index) as f64;
-    let name = |(label, n): &(String, Option<u64>)| n.map_or(label.clone(), |n| format!("{label} n={n}"));
-    let names = lines
-        .iter()
-        .enumerate()
-        .map(|(i, l)| (height(i), name(l)))
-        .collect();
-    let y = Axis::new("", Scale::Linear)
-        .with_range(0.3, count as f64 + 0.7)
-        .with_names(names);
-    let mut panel = Panel::new(suite, axis.clone(), y);
-    for (index, line) in lines.iter().enumerate() {
-        let of_line: Vec<&Labelled<'_>> = runs
-            .iter()
-            .filter(|r| (&r.label, r.n) == (&line.0, line.1))
-            .collect();
-        add_line(&mut panel, &of_line, height(index), metric);
-    }
-    (count, panel)
+    let common = Axis::log(label).fit(&values, 8);
+    // A margin, lest marks lie on the frame.
+    Ok(Axis::log(label).with_range(common.low / MARGIN, common.high * MARGIN))
 }
 
+/// Marks of runs that survived, and of those that did not.
+const SURVIVED: Style = Style {
+    colour: BLACK,
+    dash: Dash::Solid,
+    marker: Marker::Circle,
+};
+const LOST: Style = Style {
+    colour: VERMILLION,
+    dash: Dash::Solid,
+    marker: Marker::Cross,
+};
+
+/// The panel of a suite, with room for `lines` methods.
+fn suite_panel(suite: &str, runs: &[Labelled<'_>], axis: &Axis, lines: usize, metric: Metric) -> Panel {
+    let groups = by_method(runs);
+    let height = |index: usize| (lines - index) as f64;
+    let names = groups
+        .iter()
+        .enumerate()
+        .map(|(i, g)| (height(i), g[0].full()))
+        .collect();
+    let y = Axis::linear("")
+        .with_range(0.3, lines as f64 + 0.7)
+        .with_names(names);
+    let mut panel = Panel::new(suite, axis.clone(), y);
+    for (index, group) in groups.iter().enumerate() {
+        add_line(&mut panel, group, height(index), metric);
+    }
+    panel
+}
+
+/// The marks of one method at height `y`.
 fn add_line(panel: &mut Panel, runs: &[&Labelled<'_>], y: f64, metric: Metric) {
     let mut values = Vec::new();
     for metrics in runs.iter().filter_map(|r| r.row.metrics.as_ref()) {
@@ -141,11 +136,7 @@ fn add_line(panel: &mut Panel, runs: &[&Labelled<'_>], y: f64, metric: Metric) {
             continue;
         };
         values.push(value);
-        let (colour, marker) = if metrics.quality.survived {
-            (BLACK, Marker::Circle)
-        } else {
-            (VERMILLION, Marker::Cross)
-        };
+        let Style { colour, marker, .. } = if metrics.quality.survived { SURVIVED } else { LOST };
         panel.dots.push(Dot {
             at: (value, y),
             colour,
@@ -153,33 +144,42 @@ fn add_line(panel: &mut Panel, runs: &[&Labelled<'_>], y: f64, metric: Metric) {
             radius: 3.0,
         });
     }
-    let declined = runs.iter().filter(|r| r.row.metrics.is_none()).count();
-    if declined > 0 {
-        let text = if declined == runs.len() {
-            "declined".to_owned()
-        } else {
-            format!("{declined} declined")
-        };
-        let at = panel.x.range.map_or(0.0, |r| r.0 * (r.1 / r.0).powf(0.02));
-        panel.remarks.push(Remark { at: (at, y), text });
-    }
+    panel.remarks.extend(declined(runs).map(|text| {
+        let (low, high) = panel.x.range.unwrap_or((1.0, 1.0));
+        Remark {
+            at: (low * (high / low).powf(0.02), y),
+            text,
+        }
+    }));
     if let Some(middle) = median(&mut values) {
-        let stroke = |points, width| Curve {
-            name: String::new(),
-            points,
-            style: Style {
-                colour: GREY,
-                dash: Dash::Solid,
-                marker: Marker::Circle,
-            },
-            width,
-            markers: Markers::None,
-        };
         panel
             .curves
             .push(stroke(vec![(values[0], y), (values[values.len() - 1], y)], 1.0));
         panel
             .curves
             .push(stroke(vec![(middle, y - 0.36), (middle, y + 0.36)], 2.0));
+    }
+}
+
+fn declined(runs: &[&Labelled<'_>]) -> Option<String> {
+    match runs.iter().filter(|r| r.row.metrics.is_none()).count() {
+        0 => None,
+        all if all == runs.len() => Some("declined".to_owned()),
+        some => Some(format!("{some} declined")),
+    }
+}
+
+fn stroke(points: Points, width: f64) -> Curve {
+    let style = Style {
+        colour: GREY,
+        dash: Dash::Solid,
+        marker: Marker::Circle,
+    };
+    Curve {
+        name: String::new(),
+        points,
+        style,
+        width,
+        markers: Markers::None,
     }
 }

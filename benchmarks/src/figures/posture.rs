@@ -1,10 +1,11 @@
 //! Figure 7 of the paper: static torque against knee angle, crouched to stretched, with a fitted line.
 
 use super::axis::Axis;
-use super::panel::{Curve, Figure, Markers, Panel, PanelRow};
-use super::style::{BLACK, Dash, Marker, Style};
-use super::{Points, Obstacle, Studio, milliseconds};
-use crate::records::Quality;
+use super::figure::{Figure, PanelRow};
+use super::labels::by_method;
+use super::panel::{Curve, Markers, Panel};
+use super::style::{BLACK, Dash, Marker, Style, Styles};
+use super::{Obstacle, Points, Studio, Traced, milliseconds};
 use crate::statistics::line_fit;
 
 const SUITE: &str = "coman/posture";
@@ -15,93 +16,99 @@ const MAIN: (&str, u64) = ("ik4", 3);
 pub(super) fn posture(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
     let runs = studio.runs_of_suite(SUITE);
     let traced = studio.with_traces(runs)?;
-    let mut curves: Vec<Curve> = Vec::new();
-    let mut main: Points = Vec::new();
-    for one in &traced {
-        let torque = |q: &Quality| q.torque_squared_mean_n2m2;
-        let knee = one.trace.column("LKneeSag").and_then(|c| c.first().copied());
-        let Some(point) = knee.zip(one.run.row.metrics.as_ref().and_then(|m| torque(&m.quality))) else {
-            continue;
-        };
-        let is_main = (one.run.label.as_str(), one.run.n) == (MAIN.0, Some(MAIN.1));
-        if is_main {
-            main.push(point);
-        }
-        let name = one.run.full();
-        match curves.iter_mut().find(|c| c.name == name) {
-            Some(curve) => curve.points.push(point),
-            None => curves.push(Curve {
-                name,
-                points: vec![point],
-                style: studio.styles.of(&one.run.label),
-                width: if is_main { 2.6 } else { 0.9 },
-                markers: Markers::Every,
-            }),
-        }
-    }
-    let Some(first) = traced.first().filter(|_| !curves.is_empty()) else {
+    let Some(first) = traced.iter().find(|t| knee_and_torque(t).is_some()) else {
         return Err(Obstacle::NoData(format!(
             "no run with a trace and a torque on {SUITE}"
         )));
     };
-    for curve in &mut curves {
-        curve.points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    }
-    let mut panel = Panel::new(
-        "",
-        Axis::linear("left knee at the start (rad)"),
-        Axis::linear("mean Στ² for t ≥ 1 s (N²m²)"),
-    );
-    panel.curves = curves;
-    panel.curves.extend(fitted(&main));
+    let (main, others) = curves(&traced, &studio.styles);
+    let fit_points = main.as_ref().map(|m| m.points.clone()).unwrap_or_default();
+    let x = Axis::linear("left knee at the start (rad)");
+    let mut panel = Panel::new("", x, Axis::linear("mean Στ² for t ≥ 1 s (N²m²)"));
+    panel.curves = main
+        .into_iter()
+        .chain(others)
+        .chain(fitted(&fit_points))
+        .collect();
     let dt = milliseconds(first.run.row.dt_s);
     let title =
         format!("Fig. 7  Static torque from stretched to crouched: {SUITE}, all scenarios, Δt = {dt} ms");
-    let rows = vec![PanelRow {
-        height: 420.0,
-        panels: vec![panel],
-    }];
-    Ok(Figure {
-        title,
-        rows,
-        remarks: remarks(main),
-        keys: Vec::new(),
-    }
-    .render()?)
+    let rows = vec![PanelRow::new(440.0, vec![panel])];
+    Ok(Figure::new(title, rows)
+        .with_remarks(remarks(&fit_points))
+        .render()?)
 }
 
+/// The curve of the paper's method, and those of the others.
+fn curves(traced: &[Traced<'_>], styles: &Styles) -> (Option<Curve>, Vec<Curve>) {
+    let (mut main, mut others) = (None, Vec::new());
+    for group in by_method(traced.iter().map(|t| &t.run)) {
+        let of_group = traced.iter().filter(|t| t.run.is_same_method(group[0]));
+        let mut points: Points = of_group.filter_map(knee_and_torque).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (name, style) = (group[0].label.clone(), styles.of(&group[0].label));
+        if (name.as_str(), group[0].n) == (MAIN.0, Some(MAIN.1)) {
+            let name = format!("{}, fitted", group[0].full());
+            main = Some(Curve {
+                name,
+                points,
+                style,
+                width: 3.0,
+                markers: Markers::Every,
+            });
+        } else {
+            others.push(Curve {
+                name,
+                points,
+                style,
+                width: 0.9,
+                markers: Markers::Every,
+            });
+        }
+    }
+    (main, others)
+}
+
+fn knee_and_torque(one: &Traced<'_>) -> Option<(f64, f64)> {
+    let knee = *one.trace.column("LKneeSag")?.first()?;
+    Some((
+        knee,
+        one.run.row.metrics.as_ref()?.quality.torque_squared_mean_n2m2?,
+    ))
+}
+
+/// The fitted line over the range of the points, which are in rising order.
 fn fitted(points: &[(f64, f64)]) -> Option<Curve> {
     let (intercept, slope) = line_fit(points)?;
-    let ends = points
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| {
-            (l.min(p.0), h.max(p.0))
-        });
+    let ends = [points.first()?.0, points.last()?.0];
     Some(Curve {
-        name: format!("linear fit {intercept:.0} + {slope:.0} q"),
-        points: [ends.0, ends.1].map(|x| (x, intercept + slope * x)).to_vec(),
+        name: format!("fit {intercept:.0} + {slope:.0} q").replace('-', "−"),
+        points: ends.map(|x| (x, intercept + slope * x)).to_vec(),
         style: Style {
             colour: BLACK,
             dash: Dash::Short,
             marker: Marker::Circle,
         },
-        width: 1.4,
+        width: 1.6,
         markers: Markers::None,
     })
 }
 
-fn remarks(mut points: Points) -> Vec<String> {
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut remarks =
-        vec!["τ²: sum over the leg joints of squared quasi-static torques, both soles loaded.".to_owned()];
-    if let [first, .., last] = points[..] {
+/// How much more the crouched starts need than the most stretched one.
+fn remarks(points: &[(f64, f64)]) -> Vec<String> {
+    let meaning = "Στ²: sum over the leg joints of squared quasi-static torques, both soles loaded. Thin: other methods, \
+                   both budgets.";
+    let mut remarks = vec![meaning.to_owned()];
+    if let [first, rest @ ..] = points
+        && !rest.is_empty()
+    {
+        let ratio = |p: &(f64, f64)| format!("{:.1} from {:.2} rad", p.1 / first.1, p.0);
+        let ratios: Vec<String> = rest.iter().map(ratio).collect();
+        let (method, n) = MAIN;
         remarks.push(format!(
-            "{} n={}: start knee {:.2} rad needs {:.1} times the Στ² of {:.2} rad.",
-            MAIN.0,
-            MAIN.1,
-            last.0,
-            last.1 / first.1,
-            first.0
+            "{method} n={n}, Στ² relative to the start at {:.2} rad: {}.",
+            first.0,
+            ratios.join(", ")
         ));
     }
     remarks

@@ -1,15 +1,21 @@
 //! Figure 6 of the paper: what the regulator γ does to velocity and torque when the knee leaves the singularity.
 
 use super::axis::Axis;
+use super::figure::{Figure, PanelRow};
 use super::labels::Labelled;
-use super::panel::{Curve, Figure, Markers, Panel, PanelRow, time_axis};
-use super::style::{BLUE, Dash, Marker, Style, Styles, VERMILLION};
-use super::{Points, Obstacle, Studio, Traced, over_time, place_of, rate_over_time};
-use crate::records::Quality;
+use super::panel::{Curve, Markers, Panel, time_axis};
+use super::style::{BLACK, Dash, Marker, Style, Styles, VERMILLION};
+use super::{Obstacle, Points, Studio, Traced, over_time, place_of, rate_over_time};
+use crate::records::{Quality, Trace};
+use std::collections::BTreeMap;
 
 const SUITE: &str = "coman/regulator";
 /// Values of γ whose traces are shown.
 const SHOWN: [f64; 2] = [0.0, 10.0];
+/// Method whose traces are shown.
+const METHOD: &str = "ik4";
+const KNEE: &str = "LKneeSag";
+const TORQUE: &str = "torque_LKneeSag";
 const HEIGHT: f64 = 290.0;
 
 /// Figure 6.
@@ -18,60 +24,42 @@ pub(super) fn regulator(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
     let Some(first) = runs.first().cloned() else {
         return Err(Obstacle::NoData(format!("no run on {SUITE}")));
     };
-    let is_shown = |l: &&Labelled<'_>| {
-        l.row.method == "ik4"
-            && l.gamma()
-                .is_some_and(|g| SHOWN.iter().any(|s| (s - g).abs() < 1e-12))
-    };
-    let mut chosen: Vec<Labelled<'_>> = runs.iter().filter(is_shown).cloned().collect();
-    chosen.sort_by(|a, b| a.gamma().unwrap_or(0.0).total_cmp(&b.gamma().unwrap_or(0.0)));
-    let traced = studio.with_traces(chosen)?;
-    let velocity = time_panel("knee velocity, ik4", "left knee velocity (rad/s)", &traced, |t| {
-        rate_over_time(&t.trace, "LKneeSag")
+    let shown = SHOWN.iter().filter_map(|gamma| {
+        let is_meant = |l: &&Labelled<'_>| l.row.method == METHOD && l.gamma() == Some(*gamma);
+        runs.iter().find(is_meant).cloned()
     });
-    let torque = time_panel("knee torque, ik4", "left knee static torque (Nm)", &traced, |t| {
-        over_time(&t.trace, "torque_LKneeSag")
+    let traced = studio.with_traces(shown.collect())?;
+    studio.require(TORQUE, &traced);
+    let velocity = time_panel("knee velocity", "left knee velocity (rad/s)", &traced, |t| {
+        rate_over_time(t, KNEE)
     });
-    let exit = gamma_panel(
-        "exit from singularity",
-        "exit time (s)",
-        &runs,
-        &studio.styles,
-        |q| q.singularity_exit_s,
-    );
+    let torque = time_panel("knee torque", "left knee static torque (Nm)", &traced, |t| {
+        over_time(t, TORQUE)
+    });
+    let styles = &studio.styles;
+    let exit = gamma_panel("exit from singularity", "exit time (s)", &runs, styles, |q| {
+        q.singularity_exit_s
+    });
     let jump = gamma_panel(
         "acceleration peak",
         "largest |Δ²q/Δt²| (rad/s²)",
         &runs,
-        &studio.styles,
+        styles,
         |q| Some(q.acceleration_max_rad_s2),
     );
     let rows = vec![
-        PanelRow {
-            height: HEIGHT,
-            panels: vec![velocity, torque],
-        },
-        PanelRow {
-            height: HEIGHT,
-            panels: vec![exit, jump],
-        },
+        PanelRow::new(HEIGHT, vec![velocity, torque]),
+        PanelRow::new(HEIGHT, vec![exit, jump]),
     ];
-    let place = place_of(&first).replace(&format!("scenario {}, ", first.row.scenario), "");
-    let title = format!("Fig. 6  Effect of the regulator γ: {place}");
-    Ok(Figure {
-        title,
-        rows,
-        remarks: Vec::new(),
-        keys: Vec::new(),
-    }
-    .render()?)
+    let title = format!("Fig. 6  Effect of the regulator γ: {}", place_of(&first));
+    Ok(Figure::new(title, rows).render()?)
 }
 
 fn time_panel(
     title: &str,
     label: &str,
     traced: &[Traced<'_>],
-    extract: fn(&Traced<'_>) -> Option<Points>,
+    extract: fn(&Trace) -> Option<Points>,
 ) -> Panel {
     let mut panel = Panel::new(title, time_axis(), Axis::linear(label));
     for (rank, one) in traced.iter().enumerate() {
@@ -83,19 +71,19 @@ fn time_panel(
                 marker: Marker::Square,
             },
             _ => Style {
-                colour: BLUE,
+                colour: BLACK,
                 dash: Dash::Solid,
-                marker: Marker::Diamond,
+                marker: Marker::Triangle,
             },
         };
         let curve = |points| Curve {
-            name: format!("ik4, γ = {gamma}"),
+            name: format!("{METHOD}, γ = {gamma}"),
             points,
             style,
             width: 1.6,
             markers: Markers::Sparse { rank },
         };
-        panel.curves.extend(extract(one).map(curve));
+        panel.curves.extend(extract(&one.trace).map(curve));
     }
     panel
 }
@@ -111,32 +99,23 @@ fn gamma_panel(
     let mut gammas: Vec<f64> = runs.iter().filter_map(Labelled::gamma).collect();
     gammas.sort_by(f64::total_cmp);
     gammas.dedup_by(|a, b| a.to_bits() == b.to_bits());
-    let names = gammas
-        .iter()
-        .enumerate()
-        .map(|(i, g)| (i as f64, g.to_string()))
-        .collect();
-    let edge = (gammas.len() as f64 - 0.5).max(0.5);
-    let x = Axis::linear("γ").with_range(-0.5, edge).with_names(names);
-    let mut panel = Panel::new(title, x, Axis::linear(label));
-    let place = |gamma: f64| gammas.iter().position(|g| g.to_bits() == gamma.to_bits());
-    for method in methods(runs) {
-        let of_method = runs
-            .iter()
-            .filter(|r| (&r.row.method, r.n) == (&method.0, method.1));
-        let mut points: Points = of_method
-            .filter_map(|r| {
-                Some((
-                    place(r.gamma()?)? as f64,
-                    metric(&r.row.metrics.as_ref()?.quality)?,
-                ))
-            })
-            .collect();
+    let mut panel = Panel::new(title, gamma_axis(&gammas), Axis::linear(label));
+    let mut groups: BTreeMap<(&str, Option<u64>), Vec<&Labelled<'_>>> = BTreeMap::new();
+    for run in runs {
+        // Not by label: that tells the values of γ apart.
+        groups.entry((&run.row.method, run.n)).or_default().push(run);
+    }
+    for ((method, n), group) in groups {
+        let point = |run: &&Labelled<'_>| {
+            let place = gammas
+                .iter()
+                .position(|g| Some(g.to_bits()) == run.gamma().map(f64::to_bits))?;
+            Some((place as f64, metric(&run.row.metrics.as_ref()?.quality)?))
+        };
+        let mut points: Points = group.iter().filter_map(point).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let name = method
-            .1
-            .map_or(method.0.clone(), |n| format!("{} n={n}", method.0));
-        let style = styles.of(&method.0);
+        let name = n.map_or(method.to_owned(), |n| format!("{method} n={n}"));
+        let style = styles.of(method);
         panel.curves.push(Curve {
             name,
             points,
@@ -148,9 +127,12 @@ fn gamma_panel(
     panel
 }
 
-fn methods(runs: &[Labelled<'_>]) -> Vec<(String, Option<u64>)> {
-    let mut methods: Vec<(String, Option<u64>)> = runs.iter().map(|r| (r.row.method.clone(), r.n)).collect();
-    methods.sort();
-    methods.dedup();
-    methods
+fn gamma_axis(gammas: &[f64]) -> Axis {
+    let names = gammas
+        .iter()
+        .enumerate()
+        .map(|(i, g)| (i as f64, g.to_string()))
+        .collect();
+    let end = (gammas.len() as f64 - 0.5).max(0.5);
+    Axis::linear("γ").with_range(-0.5, end).with_names(names)
 }

@@ -11,7 +11,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 /// Width of every figure.
 pub(super) const WIDTH: f64 = 1000.0;
 /// Drawn pixels per point of the page.
-const FINENESS: i32 = 3;
+const FINENESS: i32 = 2;
 /// plotters writes a font size divided by this (its pixel-per-em assumption in the SVG backend).
 const FONT_FACTOR: f64 = 1.24;
 /// Width of a character as a part of the font size: that of wide sans-serif fonts, so that text never exceeds it.
@@ -46,6 +46,22 @@ pub(super) struct Stroke {
     pub(super) dash: Dash,
 }
 
+/// A legend entry.
+#[derive(Clone, Debug)]
+pub(super) struct Key {
+    pub(super) name: String,
+    pub(super) style: Style,
+    pub(super) shows: Shows,
+}
+
+/// What of a style a legend entry shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shows {
+    Line,
+    Marker,
+    Both,
+}
+
 /// Estimated width of a text.
 pub(super) fn text_width(text: &str, size: f64) -> f64 {
     CHARACTER_WIDTH * size * text.chars().count() as f64
@@ -78,7 +94,33 @@ pub(super) fn draw(height: f64, paint: impl FnOnce(&Sheet<'_>) -> Drawing) -> Re
     }
     let drawn = format!("<svg width=\"{width_px}\" height=\"{height_px}\"");
     let shown = format!("<svg width=\"{WIDTH}\" height=\"{height}\"");
-    Ok(svg.replacen(&drawn, &shown, 1))
+    Ok(compact(&svg.replacen(&drawn, &shown, 1)))
+}
+
+/// The same drawing in fewer bytes: consecutive polylines of one look, such as the dashes of a curve, become one path,
+/// and attributes at their default go.
+fn compact(svg: &str) -> String {
+    let mut result = String::with_capacity(svg.len());
+    let mut path_look: Option<&str> = None;
+    for line in svg.lines() {
+        let polyline = line
+            .strip_prefix("<polyline ")
+            .and_then(|l| l.split_once("points=\""));
+        let look = polyline.map(|p| p.0);
+        if look != path_look || look.is_none() {
+            result.push_str(if path_look.is_some() { "\"/>\n" } else { "" });
+            path_look = look;
+            result.push_str(&look.map_or(line.to_owned() + "\n", |l| format!("<path {l}d=\"")));
+        }
+        if let Some((_, points)) = polyline {
+            // In a path, points after a moveto are linetos.
+            result.push('M');
+            result.push_str(points.trim_end_matches("\"/>").trim_end());
+        }
+    }
+    result
+        .replace(" opacity=\"1\"", "")
+        .replace(" stroke=\"none\" stroke-width=\"1\"", "")
 }
 
 fn pixels(length: f64) -> i32 {
@@ -112,12 +154,7 @@ impl Sheet<'_> {
             Dash::Short => (5.0, 3.0),
             Dash::Dotted => (1.7, 2.3),
         };
-        self.put(DashedPathElement::new(
-            path,
-            pixels(dash),
-            pixels(gap),
-            look,
-        ))
+        self.put(DashedPathElement::new(path, pixels(dash), pixels(gap), look))
     }
 
     /// A filled rectangle.
@@ -186,22 +223,25 @@ impl Sheet<'_> {
         }
     }
 
-    /// Piece of line with marker and name, from `at` to the right. Returns nothing; its width is [`key_width`].
-    pub(super) fn key(&self, at: Point, name: &str, style: Style) -> Drawing {
-        let (x, y) = at;
+    /// A legend entry with its left end at a point; its width is [`key_width`].
+    pub(super) fn key(&self, (x, y): Point, key: &Key) -> Drawing {
         let stroke = Stroke {
-            colour: style.colour,
+            colour: key.style.colour,
             width: 2.0,
-            dash: style.dash,
+            dash: key.style.dash,
         };
-        self.line(&[(x, y), (x + KEY_LINE, y)], stroke)?;
-        self.marker((x + KEY_LINE / 2.0, y), 3.6, style.colour, style.marker)?;
+        if key.shows != Shows::Marker {
+            self.line(&[(x, y), (x + KEY_LINE, y)], stroke)?;
+        }
+        if key.shows != Shows::Line {
+            self.marker((x + KEY_LINE / 2.0, y), 3.6, key.style.colour, key.style.marker)?;
+        }
         let look = Type {
             size: KEY_SIZE,
             anchor: Anchor::Left,
             colour: BLACK,
         };
-        self.text(name, (x + KEY_LINE + 6.0, y), look)
+        self.text(&key.name, (x + KEY_LINE + 6.0, y), look)
     }
 }
 
@@ -209,8 +249,8 @@ const KEY_LINE: f64 = 34.0;
 const KEY_SIZE: f64 = 12.0;
 
 /// Width of a legend entry with the gap behind it.
-pub(super) fn key_width(name: &str) -> f64 {
-    KEY_LINE + 6.0 + text_width(name, KEY_SIZE) + 14.0
+pub(super) fn key_width(key: &Key) -> f64 {
+    KEY_LINE + 6.0 + text_width(&key.name, KEY_SIZE) + 14.0
 }
 
 /// Drops points that repeat the one before or lie on the straight way to the one after: the drawing stays the same.
@@ -255,7 +295,7 @@ mod tests {
         };
         let svg = draw(200.0, |s| s.text("Δt < 5 ms", (10.0, 10.0), look)).unwrap();
         assert!(
-            svg.starts_with("<svg width=\"1000\" height=\"200\" viewBox=\"0 0 3000 600\""),
+            svg.starts_with("<svg width=\"1000\" height=\"200\" viewBox=\"0 0 2000 400\""),
             "{svg}"
         );
         assert!(svg.contains("Δt &lt; 5 ms"), "{svg}");

@@ -34,7 +34,10 @@ pub(crate) fn folder(name: &str) -> PathBuf {
 
 /// A row with plausible numbers and no trace.
 pub(crate) fn row(method: &str, n: Option<u64>, suite: &str, scenario: &str) -> Row {
-    let mut parameters = BTreeMap::from([("rows".to_owned(), "soft".into()), ("gamma".to_owned(), 10.0.into())]);
+    let mut parameters = BTreeMap::from([
+        ("rows".to_owned(), "soft".into()),
+        ("gamma".to_owned(), 10.0.into()),
+    ]);
     parameters.extend(n.map(|n| ("n".to_owned(), n.into())));
     Row {
         schema: SCHEMA.to_owned(),
@@ -45,10 +48,19 @@ pub(crate) fn row(method: &str, n: Option<u64>, suite: &str, scenario: &str) -> 
         dt_s: 0.005,
         seed: 0,
         revision: "0123abc".to_owned(),
-        machine: Machine { cpu: "made-up".to_owned(), cores: 2, system: "linux x86_64".to_owned() },
-        termination: TerminationRecord::Completed { steps: BTreeMap::from([("converged".to_owned(), 600)]) },
+        machine: Machine {
+            cpu: "made-up".to_owned(),
+            cores: 2,
+            system: "linux x86_64".to_owned(),
+        },
+        termination: TerminationRecord::Completed {
+            steps: BTreeMap::from([("converged".to_owned(), 600)]),
+        },
         notes: Vec::new(),
-        metrics: Some(Metrics { quality: quality(), effort: effort() }),
+        metrics: Some(Metrics {
+            quality: quality(),
+            effort: effort(),
+        }),
         trace: None,
     }
 }
@@ -73,7 +85,13 @@ fn quality() -> Quality {
 }
 
 fn effort() -> Effort {
-    Effort { majors_mean: 3.0, majors_max: 4, step_us_median: 5.2, step_ratio_to_ik1: Some(1.0), ..Effort::default() }
+    Effort {
+        majors_mean: 3.0,
+        majors_max: 4,
+        step_us_median: 5.2,
+        step_ratio_to_ik1: Some(1.0),
+        ..Effort::default()
+    }
 }
 
 /// Writes a results folder with all Coman suites.
@@ -90,7 +108,10 @@ pub(crate) fn write_results(dir: &Path) {
     .to_vec();
     for family in 0..12 {
         let (height, roll, period) = (6 + family % 3, 1 + family / 3 % 2, 4 - family / 6);
-        scenarios.push(("coman/asymmetric".to_owned(), format!("{height}cm-0.{roll}rad-{period}s")));
+        scenarios.push((
+            "coman/asymmetric".to_owned(),
+            format!("C{height}_{roll}_{period}"),
+        ));
     }
     for knee in ["stretched", "0.2", "0.4", "0.6", "0.8", "1.0", "1.2", "1.4"] {
         scenarios.push(("coman/posture".to_owned(), knee.to_owned()));
@@ -103,10 +124,14 @@ pub(crate) fn write_results(dir: &Path) {
     }
     for (recipe, gamma) in [(RECIPES[4], 10.0), (RECIPES[8], 10.0)] {
         for scenario in ["ellipse", "polygon"] {
-            store.push(made_up(dir, recipe, "coman/boundary", scenario, gamma)).unwrap();
+            store
+                .push(made_up(dir, recipe, "coman/boundary", scenario, gamma))
+                .unwrap();
         }
         for gamma in [0.0, 1.0, 3.0, 10.0, 30.0, 100.0] {
-            store.push(made_up(dir, recipe, "coman/regulator", "F", gamma)).unwrap();
+            store
+                .push(made_up(dir, recipe, "coman/regulator", "B", gamma))
+                .unwrap();
         }
     }
     assert!(dir.join(ROWS_FILE).exists());
@@ -120,7 +145,9 @@ fn made_up(dir: &Path, recipe: Recipe, suite: &str, scenario: &str, gamma: f64) 
         row.parameters.insert("rows".to_owned(), "literal".into());
     }
     if method == "penalty-cg" && suite == "coman/lean" {
-        row.termination = TerminationRecord::Declined { reason: "made up".to_owned() };
+        row.termination = TerminationRecord::Declined {
+            reason: "made up".to_owned(),
+        };
         row.metrics = None;
         return row;
     }
@@ -138,7 +165,7 @@ fn made_up(dir: &Path, recipe: Recipe, suite: &str, scenario: &str, gamma: f64) 
     let metrics = row.metrics.as_mut().unwrap();
     metrics.quality.com_error_rms_m = Some(rms);
     metrics.quality.com_error_max_m = error.into_iter().reduce(f64::max);
-    metrics.quality.survived = !(suite == "coman/asymmetric" && (lag > 0.09 || scenario.ends_with("-3s")));
+    metrics.quality.survived = !(suite == "coman/asymmetric" && (lag > 0.09 || scenario.ends_with("_3")));
     metrics.quality.singularity_exit_s = Some(3.34 + lag + polygon + 0.05 / (1.0 + gamma));
     metrics.quality.acceleration_max_rad_s2 = 33.0 + 370.0 / (1.0 + gamma);
     metrics.quality.torque_squared_mean_n2m2 = Some(40.0 + 250.0 * start_knee * start_knee + 1e4 * floor);
@@ -151,8 +178,22 @@ fn made_up(dir: &Path, recipe: Recipe, suite: &str, scenario: &str, gamma: f64) 
 
 fn trace(suite: &str, scenario: &str, floor: f64, lag: f64, us: f64) -> Trace {
     let columns = [
-        "t", "com_x", "com_y", "com_z", "com_target_x", "com_target_y", "com_target_z", "com_error_m",
-        "com_rate_error_m_s", "LKneeSag", "RKneeSag", "LHipSag", "step_us", "majors", "minors", "torque_LKneeSag",
+        "t",
+        "com_x",
+        "com_y",
+        "com_z",
+        "com_target_x",
+        "com_target_y",
+        "com_target_z",
+        "com_error_m",
+        "com_rate_error_m_s",
+        "LKneeSag",
+        "RKneeSag",
+        "LHipSag",
+        "step_us",
+        "majors",
+        "minors",
+        "torque_LKneeSag",
     ]
     .map(str::to_owned)
     .to_vec();
@@ -176,12 +217,29 @@ fn trace(suite: &str, scenario: &str, floor: f64, lag: f64, us: f64) -> Trace {
         let stuck = target > reach || (bump(t - lag) > reach && t > lag);
         let ripple = floor * (TAU * 2.0 * t / period).sin() * f64::from(u8::from(k > 0));
         let z = if stuck { reach } else { target + ripple };
-        let knee = if height > 0.0 { start * ((reach - z).max(0.0) / (reach - 0.4887)).sqrt() } else { start };
+        let knee = if height > 0.0 {
+            start * ((reach - z).max(0.0) / (reach - 0.4887)).sqrt()
+        } else {
+            start
+        };
         let spread = 1.0 + 0.3 * (t * 70.0).sin().abs() + if k % 97 == 3 { 9.0 } else { 0.0 };
         rows.push(vec![
-            t, 0.02, 0.0, z, 0.02, 0.0, target, (z - target).abs(), floor * 30.0 * (t * 9.0).cos().abs(), knee,
-            knee * (1.0 - 0.2 * (t * 3.0).sin()), -0.5 + 1.2 * (t * 0.8).sin() + floor * 100.0,
-            if k == 0 { 0.0 } else { us * spread }, 3.0, 5.0, -0.5 - 12.0 * knee + 30.0 * (knee - knee_before),
+            t,
+            0.02,
+            0.0,
+            z,
+            0.02,
+            0.0,
+            target,
+            (z - target).abs(),
+            floor * 30.0 * (t * 9.0).cos().abs(),
+            knee,
+            knee * (1.0 - 0.2 * (t * 3.0).sin()),
+            -0.5 + 1.2 * (t * 0.8).sin() + floor * 100.0,
+            if k == 0 { 0.0 } else { us * spread },
+            3.0,
+            5.0,
+            -0.5 - 12.0 * knee + 30.0 * (knee - knee_before),
         ]);
         knee_before = knee;
     }

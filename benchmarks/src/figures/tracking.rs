@@ -1,10 +1,11 @@
 //! Figures 1–3 of the paper: tracking, knee angles and computation time for each iteration budget.
 
 use super::axis::{Axis, Scale};
+use super::figure::{Figure, PanelRow};
 use super::labels::Labelled;
-use super::panel::{Curve, Figure, Level, Markers, Panel, PanelRow, time_axis};
+use super::panel::{Curve, Level, Markers, Panel, share_y, time_axis};
 use super::style::{BLACK, Dash, Marker, Style, Styles};
-use super::{Points, Obstacle, Studio, Traced, over_time, place_of};
+use super::{Obstacle, Points, Studio, Traced, over_time, place_of};
 use crate::records::Trace;
 use crate::statistics::median_filtered;
 
@@ -12,136 +13,130 @@ use crate::statistics::median_filtered;
 const TIME_WINDOW: usize = 11;
 /// Columns of panels at most.
 const MAX_COLUMNS: usize = 3;
-const ROW_HEIGHT: f64 = 215.0;
+const ROW_HEIGHT: f64 = 207.0;
 
-type Extract = fn(&Trace) -> Option<Points>;
-
-/// One row of panels.
+/// One row of panels: a column of the trace over time.
 struct Channel {
     label: &'static str,
     scale: Scale,
-    extract: Extract,
-    reference: Option<Extract>,
-    level: Option<(f64, &'static str)>,
+    column: &'static str,
+    treatment: Treatment,
+    /// Column of the target.
+    target: Option<&'static str>,
+    /// Name and value of a horizontal line.
+    level: Option<(&'static str, f64)>,
 }
 
-fn channel(label: &'static str, scale: Scale, extract: Extract) -> Channel {
-    Channel {
-        label,
-        scale,
-        extract,
-        reference: None,
-        level: None,
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Treatment {
+    AllSamples,
+    /// Without sample 0, at which no step was made.
+    Steps,
+    /// Steps, median-filtered.
+    FilteredSteps,
+}
+
+impl Channel {
+    const fn new(label: &'static str, scale: Scale, column: &'static str, treatment: Treatment) -> Self {
+        Self {
+            label,
+            scale,
+            column,
+            treatment,
+            target: None,
+            level: None,
+        }
+    }
+
+    fn points(&self, trace: &Trace) -> Option<Points> {
+        let mut points = over_time(trace, self.column)?;
+        if self.treatment != Treatment::AllSamples {
+            points.remove(0);
+        }
+        if self.treatment == Treatment::FilteredSteps {
+            let values: Vec<f64> = points.iter().map(|p| p.1).collect();
+            let filtered = median_filtered(&values, TIME_WINDOW);
+            points
+                .iter_mut()
+                .zip(filtered)
+                .for_each(|(point, value)| point.1 = value);
+        }
+        Some(points)
     }
 }
 
-fn com_error(trace: &Trace) -> Option<Points> {
-    over_time(trace, "com_error_m")
-}
-
-fn com_rate_error(trace: &Trace) -> Option<Points> {
-    after_start(over_time(trace, "com_rate_error_m_s"))
-}
-
-fn com_height(trace: &Trace) -> Option<Points> {
-    over_time(trace, "com_z")
-}
-
-fn com_target_height(trace: &Trace) -> Option<Points> {
-    over_time(trace, "com_target_z")
-}
-
-fn left_knee(trace: &Trace) -> Option<Points> {
-    over_time(trace, "LKneeSag")
-}
-
-fn right_knee(trace: &Trace) -> Option<Points> {
-    over_time(trace, "RKneeSag")
-}
-
-fn step_time(trace: &Trace) -> Option<Points> {
-    let points = after_start(over_time(trace, "step_us"))?;
-    let times: Vec<f64> = points.iter().map(|p| p.1).collect();
-    Some(
-        points
-            .iter()
-            .map(|p| p.0)
-            .zip(median_filtered(&times, TIME_WINDOW))
-            .collect(),
+const COM_ERROR: Channel = Channel::new("CoM error (m)", Scale::Log, "com_error_m", Treatment::AllSamples);
+const COM_RATE_ERROR: Channel = Channel::new(
+    "CoM rate error (m/s)",
+    Scale::Log,
+    "com_rate_error_m_s",
+    Treatment::Steps,
+);
+const COM_HEIGHT: Channel = Channel {
+    target: Some("com_target_z"),
+    ..Channel::new("CoM height (m)", Scale::Linear, "com_z", Treatment::AllSamples)
+};
+const LEFT_KNEE: Channel = Channel {
+    level: Some(("knee limit = singularity", 0.0)),
+    ..Channel::new(
+        "left knee (rad)",
+        Scale::Linear,
+        "LKneeSag",
+        Treatment::AllSamples,
     )
-}
-
-/// Without sample 0, at which no step was made.
-fn after_start(points: Option<Points>) -> Option<Points> {
-    points.map(|p| p.into_iter().skip(1).collect())
-}
-
-fn height_channel() -> Channel {
-    Channel {
-        reference: Some(com_target_height),
-        ..channel("CoM height (m)", Scale::Linear, com_height)
-    }
-}
-
-fn knee_channel(label: &'static str, extract: Extract) -> Channel {
-    Channel {
-        level: Some((0.0, "limit = singularity")),
-        ..channel(label, Scale::Linear, extract)
-    }
-}
-
-fn time_channel() -> Channel {
-    channel("step time (µs)", Scale::Log, step_time)
-}
+};
+const RIGHT_KNEE: Channel = Channel {
+    level: Some(("knee limit = singularity", 0.0)),
+    ..Channel::new(
+        "right knee (rad)",
+        Scale::Linear,
+        "RKneeSag",
+        Treatment::AllSamples,
+    )
+};
+const STEP_TIME: Channel = Channel::new("step time (µs)", Scale::Log, "step_us", Treatment::FilteredSteps);
 
 /// Figure 1.
 pub(super) fn squat(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
-    let channels = [
-        channel("CoM error (m)", Scale::Log, com_error),
-        channel("CoM rate error (m/s)", Scale::Log, com_rate_error),
-        time_channel(),
-    ];
+    let title = "Fig. 1  Symmetric squat without singularity";
     tracking(
         studio,
         ("coman/squat", "A"),
-        "Fig. 1  Symmetric squat without singularity",
-        &channels,
+        title,
+        &[COM_ERROR, COM_RATE_ERROR, STEP_TIME],
     )
 }
 
 /// Figure 2.
 pub(super) fn stretch(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
     let title = "Fig. 2  Symmetric squat through full stretch";
-    tracking(studio, ("coman/stretch", "B"), title, &stretch_channels())
+    tracking(
+        studio,
+        ("coman/stretch", "B"),
+        title,
+        &[COM_HEIGHT, LEFT_KNEE, STEP_TIME],
+    )
 }
 
 /// Figure 2 at twice the frequency.
 pub(super) fn stretch_fast(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
     let title = "Fig. 2, faster  Symmetric squat through full stretch at 1 Hz";
-    tracking(studio, ("coman/stretch", "B1"), title, &stretch_channels())
-}
-
-fn stretch_channels() -> [Channel; 3] {
-    [
-        height_channel(),
-        knee_channel("left knee (rad)", left_knee),
-        time_channel(),
-    ]
+    tracking(
+        studio,
+        ("coman/stretch", "B1"),
+        title,
+        &[COM_HEIGHT, LEFT_KNEE, STEP_TIME],
+    )
 }
 
 /// Figure 3.
 pub(super) fn asymmetric(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
-    let channels = [
-        height_channel(),
-        knee_channel("left knee (rad)", left_knee),
-        knee_channel("right knee (rad)", right_knee),
-        time_channel(),
-    ];
+    let title = "Fig. 3  Asymmetric squat through singularities";
     tracking(
         studio,
         ("coman/asymmetric", "C"),
-        "Fig. 3  Asymmetric squat through singularities",
-        &channels,
+        title,
+        &[COM_HEIGHT, LEFT_KNEE, RIGHT_KNEE, STEP_TIME],
     )
 }
 
@@ -158,33 +153,41 @@ fn tracking(
             "no run with a trace on {suite}/{scenario}"
         )));
     };
+    for channel in channels {
+        studio.require(channel.column, &traced);
+    }
     let columns = columns(&traced);
-    let rows = channels.iter().enumerate().map(|(index, channel)| {
-        let is_last = index + 1 == channels.len();
-        let panel = |column: &Column| {
-            let mut panel = channel_panel(channel, &traced, column, &studio.styles);
-            if index > 0 {
-                panel.title.clear();
-            }
-            if !is_last {
-                panel.x.label.clear();
-            }
-            panel
-        };
-        PanelRow {
-            height: ROW_HEIGHT,
-            panels: columns.iter().map(panel).collect(),
-        }
-    });
-    let figure = Figure {
-        title: format!("{title}: {}", place_of(&first.run)),
-        rows: rows.collect(),
-        remarks: vec![format!(
-            "Step times median-filtered over {TIME_WINDOW} samples. Methods without a budget n are shown in every column."
-        )],
-        keys: Vec::new(),
-    };
-    Ok(figure.render()?)
+    let mut rows: Vec<PanelRow> = channels
+        .iter()
+        .map(|channel| channel_row(channel, &traced, &columns, &studio.styles))
+        .collect();
+    if let [heads @ .., _] = &mut rows[..] {
+        // Time is labelled once, below the last row.
+        heads
+            .iter_mut()
+            .flat_map(|row| &mut row.panels)
+            .for_each(|panel| panel.x.label.clear());
+    }
+    if let Some(top) = rows.first_mut() {
+        top.panels
+            .iter_mut()
+            .zip(&columns)
+            .for_each(|(panel, column)| panel.title.clone_from(&column.title));
+    }
+    let remark = format!(
+        "Step times median-filtered over {TIME_WINDOW} samples. Methods without a budget n are shown in every column."
+    );
+    let title = format!("{title}: {}", place_of(&first.run));
+    Ok(Figure::new(title, rows).with_remarks(vec![remark]).render()?)
+}
+
+fn channel_row(channel: &Channel, traced: &[Traced<'_>], columns: &[Column], styles: &Styles) -> PanelRow {
+    let panels = columns
+        .iter()
+        .map(|column| channel_panel(channel, traced, column, styles));
+    let mut panels: Vec<Panel> = panels.collect();
+    share_y(&mut panels);
+    PanelRow::new(ROW_HEIGHT, panels)
 }
 
 /// A column of panels: the runs with this budget, and those without one.
@@ -211,23 +214,18 @@ fn columns(traced: &[Traced<'_>]) -> Vec<Column> {
 }
 
 fn channel_panel(channel: &Channel, traced: &[Traced<'_>], column: &Column, styles: &Styles) -> Panel {
-    let mut panel = Panel::new(
-        &column.title,
-        time_axis(),
-        Axis::new(channel.label, channel.scale),
-    );
-    panel.levels.extend(channel.level.map(|(value, text)| Level {
+    let mut panel = Panel::new("", time_axis(), Axis::new(channel.label, channel.scale));
+    panel.levels.extend(channel.level.map(|(name, value)| Level {
+        name: name.to_owned(),
         value,
-        text: text.to_owned(),
     }));
     let shown = traced.iter().filter(|t| t.run.n.is_none() || t.run.n == column.n);
     for (rank, one) in shown.enumerate() {
         if rank == 0 {
-            panel
-                .curves
-                .extend(channel.reference.and_then(|r| r(&one.trace)).map(reference_curve));
+            let target = channel.target.and_then(|column| over_time(&one.trace, column));
+            panel.curves.extend(target.map(reference_curve));
         }
-        let points = (channel.extract)(&one.trace);
+        let points = channel.points(&one.trace);
         panel
             .curves
             .extend(points.map(|p| method_curve(&one.run, p, rank, styles)));
@@ -236,12 +234,7 @@ fn channel_panel(channel: &Channel, traced: &[Traced<'_>], column: &Column, styl
 }
 
 /// A curve in the style of its method.
-pub(super) fn method_curve(
-    run: &Labelled<'_>,
-    points: Points,
-    rank: usize,
-    styles: &Styles,
-) -> Curve {
+pub(super) fn method_curve(run: &Labelled<'_>, points: Points, rank: usize, styles: &Styles) -> Curve {
     let markers = Markers::Sparse { rank };
     Curve {
         name: run.label.clone(),

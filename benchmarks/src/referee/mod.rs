@@ -5,7 +5,7 @@
 //! read, except by [`Referee::own_stationarity`], which checks such a claim.
 //!
 //! A run is judged as far as it can be read: up to the first sample that is no configuration (wrong length, a
-//! number that is not finite or beyond [`LARGEST_READABLE`], a root quaternion that is not of unit length),
+//! number that is not finite or beyond [`LARGEST_READABLE`], a quaternion that is not of unit length),
 //! or that has no such target. Numbers judged are therefore always finite, and a run that ends early has not
 //! survived.
 
@@ -98,11 +98,9 @@ pub enum RefereeError {
         /// The right length.
         needed: usize,
     },
-    /// A vector with an entry that is not finite or too large, or a root quaternion that is not of unit
+    /// A vector with an entry that is not finite or too large, or a quaternion that is not of unit
     /// length.
-    #[error(
-        "{field}: numbers must be finite and at most {LARGEST_READABLE:e}, quaternions of unit length"
-    )]
+    #[error("{field}: numbers must be finite and at most {LARGEST_READABLE:e}, quaternions of unit length")]
     Unreadable {
         /// Which vector.
         field: &'static str,

@@ -61,13 +61,27 @@ impl Case {
         let spec = varied_problem(suite, scenario, variation, &place)?;
         let problem = spec.build(&place)?;
         let Some(start) = suite.starts.get(&scenario.start) else {
-            return Err(InputError::unknown(&place, "start", &scenario.start, suite.starts.keys()));
+            return Err(InputError::unknown(
+                &place,
+                "start",
+                &scenario.start,
+                suite.starts.keys(),
+            ));
         };
-        let q_start = start.build(problem.robot(), &format!("{}: starts.{}", suite.source, scenario.start))?;
+        let q_start = start.build(
+            problem.robot(),
+            &format!("{}: starts.{}", suite.source, scenario.start),
+        )?;
         let dt_s = variation.dt_s.unwrap_or(suite.dt_s);
         let grid = Grid::new(dt_s, scenario.duration_s, spec.preview_s, &place)?;
         check_polygon(&spec.boundary, dt_s, &place)?;
-        let trajectory = Trajectory::new(&problem, &q_start, &scenario.motion, &suite.source, &motion_field(index))?;
+        let trajectory = Trajectory::new(
+            &problem,
+            &q_start,
+            &scenario.motion,
+            &suite.source,
+            &motion_field(index),
+        )?;
         let samples = Samples::new(&problem, &trajectory, grid, spec.rates, &place)?;
         let referee = judge(suite, &problem)?;
         let notes = match spec.rates {
@@ -76,7 +90,18 @@ impl Case {
         };
         let scenario = variation.label(&scenario.id);
         let (suite, suite_dt_s) = (suite.id.clone(), suite.dt_s);
-        Ok(Self { suite, scenario, spec, problem, q_start, dt_s, suite_dt_s, samples, referee, notes })
+        Ok(Self {
+            suite,
+            scenario,
+            spec,
+            problem,
+            q_start,
+            dt_s,
+            suite_dt_s,
+            samples,
+            referee,
+            notes,
+        })
     }
 }
 
@@ -111,11 +136,19 @@ fn varied_problem(
     spec.boundary = scenario.boundary.unwrap_or(spec.boundary);
     spec.rates = variation.rates.unwrap_or(spec.rates);
     if variation.velocity.is_some() {
-        spec.limits.push(LimitsSpec { velocity: variation.velocity, ..LimitsSpec::default() });
+        spec.limits.push(LimitsSpec {
+            velocity: variation.velocity,
+            ..LimitsSpec::default()
+        });
     }
     if let Some(margin) = variation.margin {
         let Boundary::Ellipse { .. } = spec.boundary else {
-            return Err(InputError::value(place, "margin", margin, "no margin: the boundary is not an ellipse"));
+            return Err(InputError::value(
+                place,
+                "margin",
+                margin,
+                "no margin: the boundary is not an ellipse",
+            ));
         };
         spec.boundary = Boundary::Ellipse { margin };
     }
@@ -140,10 +173,14 @@ fn judge(suite: &Suite, problem: &Arc<Problem>) -> Result<Referee, InputError> {
     let spec = JudgeSpec {
         com_tolerance_m: suite.com_tolerance_m,
         exit_joints: suite.exit_joints.clone(),
-        torque_supports: supports.map(|name| frame(robot, name, &place)).collect::<Result<_, _>>()?,
+        torque_supports: supports
+            .map(|name| frame(robot, name, &place))
+            .collect::<Result<_, _>>()?,
     };
-    Referee::new(problem, spec)
-        .map_err(|e| InputError::Syntax { file: suite.source.clone(), reason: e.to_string() })
+    Referee::new(problem, spec).map_err(|e| InputError::Syntax {
+        file: suite.source.clone(),
+        reason: e.to_string(),
+    })
 }
 
 impl StartSpec {
@@ -154,13 +191,20 @@ impl StartSpec {
             Root::Floating => self.place_root(&mut q, place)?,
             Root::Fixed if self.base_position_m.is_some() || self.base_rpy_rad.is_some() => {
                 let allowed = "nothing: the root of this robot is fixed";
-                return Err(InputError::value(place, "base_position_m or base_rpy_rad", "a pose", allowed));
+                return Err(InputError::value(
+                    place,
+                    "base_position_m or base_rpy_rad",
+                    "a pose",
+                    allowed,
+                ));
             }
             Root::Fixed => {}
         }
         for (name, &value) in &self.joints {
             let known = robot.coordinates().iter().map(|c| &c.name);
-            let index = robot.coordinate(name).map_err(|_| InputError::unknown(place, "joint", name, known))?;
+            let index = robot
+                .coordinate(name)
+                .map_err(|_| InputError::unknown(place, "joint", name, known))?;
             finite(place, &format!("joints.{name}"), value)?;
             q[robot.root().nq() + index] = value;
         }
@@ -169,7 +213,10 @@ impl StartSpec {
     }
 
     fn place_root(&self, q: &mut [f64], place: &str) -> Result<(), InputError> {
-        let (position, rpy) = (self.base_position_m.unwrap_or_default(), self.base_rpy_rad.unwrap_or_default());
+        let (position, rpy) = (
+            self.base_position_m.unwrap_or_default(),
+            self.base_rpy_rad.unwrap_or_default(),
+        );
         for (field, values) in [("base_position_m", position), ("base_rpy_rad", rpy)] {
             for (i, value) in values.into_iter().enumerate() {
                 finite(place, &format!("{field}[{i}]"), value)?;
@@ -185,8 +232,16 @@ impl StartSpec {
 fn check_limits(robot: &Robot, q: &[f64], place: &str) -> Result<(), InputError> {
     for (c, &value) in robot.coordinates().iter().zip(&q[robot.root().nq()..]) {
         if !(c.limits.lower..=c.limits.upper).contains(&value) {
-            let allowed = format!("within the limits of the joint, {} .. {}", c.limits.lower, c.limits.upper);
-            return Err(InputError::value(place, &format!("joints.{}", c.name), value, &allowed));
+            let allowed = format!(
+                "within the limits of the joint, {} .. {}",
+                c.limits.lower, c.limits.upper
+            );
+            return Err(InputError::value(
+                place,
+                &format!("joints.{}", c.name),
+                value,
+                &allowed,
+            ));
         }
     }
     Ok(())

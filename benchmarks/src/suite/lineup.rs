@@ -29,8 +29,14 @@ pub struct Selection {
 /// Unknown methods and parameters, values out of range.
 pub fn lineup(suite: &Suite, selection: &Selection) -> Result<Vec<Contestant>, InputError> {
     let lines = selected_lines(suite, selection)?;
-    if let Some(key) = selection.set.keys().find(|key| !lines.iter().any(|(entry, _)| has(entry, key))) {
-        let known = lines.iter().flat_map(|(entry, _)| entry.fields().iter().map(|f| f.key));
+    if let Some(key) = selection
+        .set
+        .keys()
+        .find(|key| !lines.iter().any(|(entry, _)| has(entry, key)))
+    {
+        let known = lines
+            .iter()
+            .flat_map(|(entry, _)| entry.fields().iter().map(|f| f.key));
         let mut known: Vec<_> = known.collect();
         known.sort_unstable();
         known.dedup();
@@ -58,9 +64,17 @@ pub fn lineup(suite: &Suite, selection: &Selection) -> Result<Vec<Contestant>, I
 pub(crate) fn build(entry: &Entry, parameters: &Table, place: &str) -> Result<Contestant, InputError> {
     if let Some(key) = parameters.keys().find(|key| !has(entry, key)) {
         let place = format!("{place}: method `{}`", entry.info().id);
-        return Err(InputError::unknown(&place, "parameter", key, entry.fields().iter().map(|f| f.key)));
+        return Err(InputError::unknown(
+            &place,
+            "parameter",
+            key,
+            entry.fields().iter().map(|f| f.key),
+        ));
     }
-    entry.build(parameters).map_err(|source| InputError::Parameter { place: place.to_owned(), source })
+    entry.build(parameters).map_err(|source| InputError::Parameter {
+        place: place.to_owned(),
+        source,
+    })
 }
 
 /// The registered method of that id.
@@ -85,7 +99,11 @@ fn selected_lines(suite: &Suite, selection: &Selection) -> Result<Vec<(&'static 
     for id in &selection.methods {
         let entry = known_method(id, "--method")?;
         let before = lines.len();
-        lines.extend(all.iter().filter(|(other, _)| other.info().id == id.as_str()).cloned());
+        lines.extend(
+            all.iter()
+                .filter(|(other, _)| other.info().id == id.as_str())
+                .cloned(),
+        );
         if lines.len() == before {
             lines.push(usual_line(entry));
         }
@@ -94,8 +112,15 @@ fn selected_lines(suite: &Suite, selection: &Selection) -> Result<Vec<(&'static 
 }
 
 fn suite_lines(suite: &Suite) -> Result<Vec<(&'static Entry, Table)>, InputError> {
-    let default = [ContestantSpec { method: EVERY.to_owned(), set: Table::new() }];
-    let specs = if suite.contestants.is_empty() { &default[..] } else { &suite.contestants };
+    let default = [ContestantSpec {
+        method: EVERY.to_owned(),
+        set: Table::new(),
+    }];
+    let specs = if suite.contestants.is_empty() {
+        &default[..]
+    } else {
+        &suite.contestants
+    };
     let mut lines = Vec::new();
     for (i, spec) in specs.iter().enumerate() {
         let place = format!("{}: contestants[{i}]", suite.source);
@@ -127,7 +152,10 @@ fn products(values: &Table) -> Vec<Table> {
             table.insert(key.clone(), choice.clone());
             table
         };
-        tables = tables.iter().flat_map(|table| choices.iter().map(|c| extend(table, c)).collect::<Vec<_>>()).collect();
+        tables = tables
+            .iter()
+            .flat_map(|table| choices.iter().map(|c| extend(table, c)).collect::<Vec<_>>())
+            .collect();
     }
     tables
 }
@@ -137,12 +165,25 @@ mod tests {
     use super::*;
 
     fn ids(suite: &Suite, selection: &Selection) -> Vec<String> {
-        let describe = |c: Contestant| format!("{} {}", c.id, c.parameters.get("n").map_or(String::new(), Value::to_string));
-        lineup(suite, selection).unwrap().into_iter().map(describe).collect()
+        let describe = |c: Contestant| {
+            format!(
+                "{} {}",
+                c.id,
+                c.parameters.get("n").map_or(String::new(), Value::to_string)
+            )
+        };
+        lineup(suite, selection)
+            .unwrap()
+            .into_iter()
+            .map(describe)
+            .collect()
     }
 
     fn selection(methods: &[&str], set: &str) -> Selection {
-        Selection { methods: methods.iter().map(ToString::to_string).collect(), set: set.parse().unwrap() }
+        Selection {
+            methods: methods.iter().map(ToString::to_string).collect(),
+            set: set.parse().unwrap(),
+        }
     }
 
     #[test]
@@ -166,8 +207,14 @@ mod tests {
     #[test]
     fn a_selection_filters_sets_and_removes_repetitions() {
         let suite = Suite::load("coman/squat").unwrap();
-        assert_eq!(ids(&suite, &selection(&["ik5", "ik1"], "n = 7")), ["ik5 7", "ik1 "]);
-        assert_eq!(ids(&suite, &selection(&["ik2"], "n = [1, 2]")), ["ik2 1", "ik2 2"]);
+        assert_eq!(
+            ids(&suite, &selection(&["ik5", "ik1"], "n = 7")),
+            ["ik5 7", "ik1 "]
+        );
+        assert_eq!(
+            ids(&suite, &selection(&["ik2"], "n = [1, 2]")),
+            ["ik2 1", "ik2 2"]
+        );
         let regulator = Suite::load("coman/regulator").unwrap();
         assert_eq!(ids(&regulator, &selection(&["ik3"], "")), ["ik3 "]);
     }
@@ -178,7 +225,10 @@ mod tests {
         let message = |s: Selection| lineup(&suite, &s).unwrap_err().to_string();
         assert!(message(selection(&["ik44"], "")).contains("did you mean `ik4`?"));
         let text = message(selection(&["ik4"], "gama = 3"));
-        assert!(text.contains("unknown parameter `gama`, did you mean `gamma`?"), "{text}");
+        assert!(
+            text.contains("unknown parameter `gama`, did you mean `gamma`?"),
+            "{text}"
+        );
         let text = message(selection(&["ik4"], "gamma = -1"));
         assert!(text.contains("gamma") && text.contains("-1"), "{text}");
     }

@@ -101,10 +101,16 @@ pub struct ContestantSpec {
 pub const EMBEDDED: &[(&str, &str)] = &[
     ("coman/squat", include_str!("../../suites/coman/squat.toml")),
     ("coman/stretch", include_str!("../../suites/coman/stretch.toml")),
-    ("coman/asymmetric", include_str!("../../suites/coman/asymmetric.toml")),
+    (
+        "coman/asymmetric",
+        include_str!("../../suites/coman/asymmetric.toml"),
+    ),
     ("coman/lean", include_str!("../../suites/coman/lean.toml")),
     ("coman/boundary", include_str!("../../suites/coman/boundary.toml")),
-    ("coman/regulator", include_str!("../../suites/coman/regulator.toml")),
+    (
+        "coman/regulator",
+        include_str!("../../suites/coman/regulator.toml"),
+    ),
     ("coman/posture", include_str!("../../suites/coman/posture.toml")),
 ];
 
@@ -118,11 +124,16 @@ impl Suite {
             return Self::parse(text, &format!("suite {id}"), Path::new("."));
         }
         if !name.ends_with(".toml") {
-            let known = EMBEDDED.iter().map(|(id, _)| *id).chain(["or the path of a .toml file"]);
+            let known = EMBEDDED
+                .iter()
+                .map(|(id, _)| *id)
+                .chain(["or the path of a .toml file"]);
             return Err(InputError::unknown("command line", "suite", name, known));
         }
-        let text = std::fs::read_to_string(name)
-            .map_err(|e| InputError::File { file: name.to_owned(), reason: e.to_string() })?;
+        let text = std::fs::read_to_string(name).map_err(|e| InputError::File {
+            file: name.to_owned(),
+            reason: e.to_string(),
+        })?;
         Self::parse(&text, name, Path::new(name).parent().unwrap_or(Path::new(".")))
     }
 
@@ -139,8 +150,9 @@ impl Suite {
     /// # Errors
     /// Text that is no suite, with line and column; ids that are no ids, no scenario.
     pub fn parse(text: &str, source: &str, folder: &Path) -> Result<Self, InputError> {
-        let syntax = |e: toml::de::Error| {
-            InputError::Syntax { file: source.to_owned(), reason: e.to_string().trim_end().to_owned() }
+        let syntax = |e: toml::de::Error| InputError::Syntax {
+            file: source.to_owned(),
+            reason: e.to_string().trim_end().to_owned(),
         };
         let mut suite: Self = toml::from_str(text).map_err(syntax)?;
         source.clone_into(&mut suite.source);

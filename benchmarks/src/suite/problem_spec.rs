@@ -125,11 +125,19 @@ impl RobotSpec {
     /// # Errors
     /// A file that cannot be read.
     pub(crate) fn inlined(self, folder: &Path) -> Result<Self, InputError> {
-        let Self::UrdfFile { path, root } = self else { return Ok(self) };
+        let Self::UrdfFile { path, root } = self else {
+            return Ok(self);
+        };
         let file = folder.join(&path).display().to_string();
-        let text = std::fs::read_to_string(&file)
-            .map_err(|e| InputError::File { file: file.clone(), reason: e.to_string() })?;
-        Ok(Self::Urdf { name: file, text, root })
+        let text = std::fs::read_to_string(&file).map_err(|e| InputError::File {
+            file: file.clone(),
+            reason: e.to_string(),
+        })?;
+        Ok(Self::Urdf {
+            name: file,
+            text,
+            root,
+        })
     }
 
     fn build(&self, place: &str) -> Result<Robot, InputError> {
@@ -142,7 +150,10 @@ impl RobotSpec {
             ik_core::robot::RobotError::UnknownRobot { id, known } => {
                 InputError::unknown(&format!("{place}: robot.embedded"), "robot", &id, known)
             }
-            source => InputError::Robot { place: place.to_owned(), source },
+            source => InputError::Robot {
+                place: place.to_owned(),
+                source: Box::new(source),
+            },
         })
     }
 }
@@ -157,11 +168,17 @@ impl ProblemSpec {
         for limits in &self.limits {
             robot = limits.apply(robot, place)?;
         }
-        let mut phase = Phase { name: "whole".to_owned(), tasks: Vec::new() };
+        let mut phase = Phase {
+            name: "whole".to_owned(),
+            tasks: Vec::new(),
+        };
         let mut tasks = Vec::new();
         for (i, spec) in self.tasks.iter().enumerate() {
             let place = format!("{place}: tasks[{i}]");
-            tasks.push(Task { name: checked_name(&spec.name, &place)?, track: spec.track.build(&robot, &place)? });
+            tasks.push(Task {
+                name: checked_name(&spec.name, &place)?,
+                track: spec.track.build(&robot, &place)?,
+            });
             phase.tasks.push((i, spec.priority.build()));
         }
         let parts = ProblemParts {
@@ -171,18 +188,28 @@ impl ProblemSpec {
             boundary: self.boundary,
             objectives: Vec::new(),
             kind: Kind::Tracking,
-            supplies: Supplies { rates: self.rates != Rates::Zero, preview_s: self.preview_s },
+            supplies: Supplies {
+                rates: self.rates != Rates::Zero,
+                preview_s: self.preview_s,
+            },
             orientation: self.orientation,
         };
         let problem = Problem::new(parts);
-        problem.map(Arc::new).map_err(|source| InputError::Problem { place: place.to_owned(), source })
+        problem.map(Arc::new).map_err(|source| InputError::Problem {
+            place: place.to_owned(),
+            source,
+        })
     }
 }
 
 impl LimitsSpec {
     fn apply(&self, mut robot: Robot, place: &str) -> Result<Robot, InputError> {
         let all: Vec<String> = robot.coordinates().iter().map(|c| c.name.clone()).collect();
-        let joints = if self.joints.is_empty() { &all } else { &self.joints };
+        let joints = if self.joints.is_empty() {
+            &all
+        } else {
+            &self.joints
+        };
         for joint in joints {
             let place = format!("{place}: limits");
             let Ok(index) = robot.coordinate(joint) else {
@@ -195,13 +222,25 @@ impl LimitsSpec {
                 velocity: self.velocity.unwrap_or(old.velocity),
                 ..old
             };
-            for (field, value) in [("lower", self.lower), ("upper", self.upper), ("velocity", self.velocity)] {
+            for (field, value) in [
+                ("lower", self.lower),
+                ("upper", self.upper),
+                ("velocity", self.velocity),
+            ] {
                 crate::error::finite(&place, field, value.unwrap_or(0.0))?;
             }
             if self.velocity.is_some_and(|v| v <= 0.0) {
-                return Err(InputError::value(&place, "velocity", limits.velocity, "a finite number above 0"));
+                return Err(InputError::value(
+                    &place,
+                    "velocity",
+                    limits.velocity,
+                    "a finite number above 0",
+                ));
             }
-            robot = robot.with_limits(joint, limits).map_err(|source| InputError::Robot { place, source })?;
+            robot = robot.with_limits(joint, limits).map_err(|e| InputError::Robot {
+                place,
+                source: Box::new(e),
+            })?;
         }
         Ok(robot)
     }
@@ -232,13 +271,24 @@ impl PrioritySpec {
 /// The frame of that name.
 pub(crate) fn frame(robot: &Robot, name: &str, place: &str) -> Result<FrameId, InputError> {
     let known = robot.frames().iter().map(|f| &f.name);
-    robot.frame(name).map_err(|_| InputError::unknown(place, "frame", name, known))
+    robot
+        .frame(name)
+        .map_err(|_| InputError::unknown(place, "frame", name, known))
 }
 
 /// Task names head the columns of a trace.
 fn checked_name(name: &str, place: &str) -> Result<String, InputError> {
-    if !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
+    if !name.is_empty()
+        && name
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
+    {
         return Ok(name.to_owned());
     }
-    Err(InputError::value(place, "name", format!("`{name}`"), "letters, digits, `_` and `-`"))
+    Err(InputError::value(
+        place,
+        "name",
+        format!("`{name}`"),
+        "letters, digits, `_` and `-`",
+    ))
 }

@@ -1,0 +1,334 @@
+#![allow(
+    clippy::float_cmp,
+    clippy::unwrap_used,
+    reason = "tests compare copies and want to stop at the first surprise"
+)]
+#![allow(clippy::print_stdout, reason = "a skipped test says why")]
+
+use super::*;
+use crate::trajectory::Shape;
+use ik_core::kinematics::{Page, forward};
+
+fn cases(suite: &Suite) -> Vec<Case> {
+    (0..suite.scenarios.len())
+        .map(|i| Case::new(suite, i, &Variation::default()).unwrap())
+        .collect()
+}
+
+#[test]
+fn embedded_suites_are_sound() {
+    for ((id, _), suite) in EMBEDDED.iter().zip(Suite::load_embedded().unwrap()) {
+        assert_eq!(*id, suite.id);
+        assert!(
+            suite.analysis.len() > 400 && suite.analysis.contains("Caution"),
+            "{id}"
+        );
+        assert!(
+            suite.scenarios.iter().any(|s| s.quick),
+            "{id} has a quick scenario"
+        );
+        assert!(!lineup(&suite, &Selection::default()).unwrap().is_empty());
+        assert_eq!(cases(&suite).len(), suite.scenarios.len());
+    }
+}
+
+/// Pelvis upright, knees bent alike, soles flat at z = 0, x = 0, y = ±0.0726, centre of mass at x = 0.02.
+#[test]
+fn starts_obey_the_pose_rule() {
+    let mut checked = 0;
+    for suite in Suite::load_embedded().unwrap() {
+        for case in cases(&suite) {
+            let robot = case.problem.robot();
+            let q = &case.q_start;
+            let mut page = Page::new(robot);
+            forward(robot, q, &mut page);
+            assert_eq!(q[3..7], [0.0, 0.0, 0.0, 1.0]);
+            assert!(
+                (page.centre_of_mass().x - 0.02).abs() < 1e-12,
+                "{}/{}",
+                case.suite,
+                case.scenario
+            );
+            for (frame, y) in [("l_sole", 0.0726), ("r_sole", -0.0726)] {
+                let pose = page.frame_pose(robot, robot.frame(frame).unwrap());
+                let p = pose.translation.vector;
+                assert!(p.x.abs().max((p.y - y).abs()).max(p.z.abs()) < 1e-12, "{p}");
+                assert!(pose.rotation.angle() < 1e-12);
+            }
+            let joint = |name: &str| q[7 + robot.coordinate(name).unwrap()];
+            assert_eq!(joint("LKneeSag"), joint("RKneeSag"));
+            for other in ["HipLat", "HipYaw", "AnkLat"] {
+                assert_eq!(
+                    (joint(&format!("L{other}")), joint(&format!("R{other}"))),
+                    (0.0, 0.0)
+                );
+            }
+            checked += 1;
+        }
+    }
+    assert!(checked >= 29, "{checked}");
+}
+
+#[test]
+fn the_crouched_start_is_that_of_the_specification() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/papers/coman-spec.json");
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        println!("skipped: the folder `shared` beside the project is absent");
+        return;
+    };
+    let spec: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let expected: Vec<f64> = serde_json::from_value(spec["q0"].clone()).unwrap();
+    let suite = Suite::load("coman/asymmetric").unwrap();
+    for case in cases(&suite) {
+        assert_eq!(case.q_start[..3], expected[..3]);
+        assert_eq!(case.q_start[7..], expected[6..]);
+    }
+}
+
+#[test]
+fn posture_starts_have_the_knees_of_their_name() {
+    let suite = Suite::load("coman/posture").unwrap();
+    for (case, scenario) in cases(&suite).iter().zip(&suite.scenarios) {
+        let knee = case.q_start[7 + case.problem.robot().coordinate("LKneeSag").unwrap()];
+        assert_eq!(knee, scenario.id.parse().unwrap_or(0.15), "{}", scenario.id);
+    }
+}
+
+#[test]
+fn the_family_has_the_parameters_of_its_ids_and_c_among_them() {
+    let suite = Suite::load("coman/asymmetric").unwrap();
+    assert_eq!(suite.scenarios.len(), 13);
+    for scenario in &suite.scenarios[1..] {
+        let numbers: Vec<f64> = scenario.id[1..].split('_').map(|n| n.parse().unwrap()).collect();
+        let Shape::Bump {
+            amplitude,
+            period_s: 2.0,
+        } = scenario.motion[0].shape
+        else {
+            panic!("{}", scenario.id)
+        };
+        assert!((amplitude - numbers[0] / 100.0).abs() < 1e-15);
+        let Shape::SmoothSine {
+            amplitude,
+            rise_s: 1.0,
+            period_s,
+        } = scenario.motion[1].shape
+        else {
+            panic!("{}", scenario.id)
+        };
+        assert!((amplitude - numbers[1] / 10.0).abs() < 1e-15 && period_s == numbers[2]);
+    }
+    let repeated = suite.scenarios.iter().find(|s| s.id == "C7_2_4").unwrap();
+    assert_eq!(repeated.motion, suite.scenarios[0].motion);
+}
+
+#[test]
+fn a_problem_survives_json() {
+    for suite in Suite::load_embedded().unwrap() {
+        for case in cases(&suite) {
+            let text = serde_json::to_string(&case.spec).unwrap();
+            assert_eq!(serde_json::from_str::<ProblemSpec>(&text).unwrap(), case.spec);
+        }
+    }
+}
+
+#[test]
+fn variations_change_the_problem_and_say_so() {
+    let suite = Suite::load("coman/squat").unwrap();
+    let variation = Variation {
+        velocity: Some(2.0),
+        margin: Some(0.0873),
+        ..Variation::default()
+    };
+    let case = Case::new(&suite, 0, &variation).unwrap();
+    assert_eq!(case.scenario, "A+velocity=2+margin=0.0873");
+    assert!(
+        case.problem
+            .robot()
+            .coordinates()
+            .iter()
+            .all(|c| c.limits.velocity == 2.0)
+    );
+    assert_eq!(*case.problem.boundary(), Boundary::Ellipse { margin: 0.0873 });
+    let boundary = Suite::load("coman/boundary").unwrap();
+    let margin = Variation {
+        margin: Some(0.1),
+        ..Variation::default()
+    };
+    let message = Case::new(&boundary, 1, &margin).unwrap_err().to_string();
+    assert!(
+        message.contains("margin") && message.contains("not an ellipse"),
+        "{message}"
+    );
+}
+
+/// The message for a suite that is `coman/squat` with `from` replaced.
+fn message(from: &str, to: &str) -> String {
+    let text = EMBEDDED[0].1;
+    assert!(text.contains(from), "{from}");
+    let parsed = Suite::parse(&text.replacen(from, to, 1), "mine.toml", Path::new("."));
+    let built = parsed.and_then(|suite| {
+        lineup(&suite, &Selection::default())?;
+        Case::new(&suite, 0, &Variation::default())
+    });
+    built.unwrap_err().to_string()
+}
+
+#[test]
+fn bad_suites_are_refused_with_place_field_value_and_remedy() {
+    let line = EMBEDDED[0].1.lines().position(|l| l.starts_with("dt_s")).unwrap() + 1;
+    let expectations: [(&str, &str, &[&str]); 19] = [
+        (
+            "dt_s = 0.005",
+            "dt_s = 'slow'",
+            &["mine.toml", &format!("line {line}"), "string", "f64"],
+        ),
+        (
+            "dt_s = 0.005",
+            "dt_s = 0.005\ncolour = 3",
+            &[
+                "mine.toml",
+                &format!("line {}", line + 1),
+                "colour",
+                "com_tolerance_m",
+            ],
+        ),
+        ("dt_s = 0.005", "dt_s = 0", &["dt_s = 0", "above 0"]),
+        ("dt_s = 0.005", "dt_s = nan", &["dt_s = NaN", "finite"]),
+        (
+            "com_tolerance_m = 0.08",
+            "com_tolerance_m = -1",
+            &["com_tolerance_m = -1", "above 0"],
+        ),
+        (
+            "amplitude = 0.03",
+            "amplitude = nan",
+            &["scenarios[0].motion[0].shape.bump.amplitude = NaN", "finite"],
+        ),
+        (
+            "amplitude = 0.03",
+            "amplitude = -inf",
+            &["amplitude = -inf", "finite"],
+        ),
+        (
+            "amplitude = 0.03",
+            "amplitud = 0.03",
+            &["line", "amplitud", "period_s"],
+        ),
+        ("bump = {", "hump = {", &["line", "hump", "smooth-step"]),
+        (
+            "component = \"z\"",
+            "component = \"pitch\"",
+            &["component `pitch`", "x, y, z"],
+        ),
+        (
+            "task = \"com\"",
+            "task = \"con\"",
+            &["task `con`", "did you mean `com`?"],
+        ),
+        (
+            "\"coman-legs\"",
+            "\"coman-leg\"",
+            &["robot `coman-leg`", "did you mean `coman-legs`?"],
+        ),
+        (
+            "\"l_sole\"",
+            "\"l_soul\"",
+            &["frame `l_soul`", "did you mean `l_sole`?"],
+        ),
+        (
+            "joints.LKneeSag = 1.2",
+            "joints.LKneeSag = 1.95",
+            &["joints.LKneeSag = 1.95", "0 .. 1.9199"],
+        ),
+        (
+            "joints.LKneeSag = 1.2",
+            "joints.LKneSag = 1.2",
+            &["joint `LKneSag`", "did you mean `LKneeSag`?"],
+        ),
+        (
+            "base_rpy_rad = [0.0, 0.0, 0.0]",
+            "base_rpy_rad = [0.0, 0.0]",
+            &["line", "length 2", "length 3"],
+        ),
+        (
+            "start = \"crouched\"",
+            "start = \"standing\"",
+            &["start `standing`", "crouched"],
+        ),
+        ("margin = 0.0", "margin = 1.0", &["margin", "leaves no range"]),
+        (
+            "method = \"ik4\"",
+            "method = \"ik6\"",
+            &["contestants[1].method", "method `ik6`", "ik4"],
+        ),
+    ];
+    for (from, to, words) in expectations {
+        let message = message(from, to);
+        for word in words {
+            assert!(
+                message.contains(word),
+                "`{to}`: `{word}` is missing in: {message}"
+            );
+        }
+    }
+}
+
+#[test]
+fn limits_can_be_replaced_and_are_checked() {
+    let limits = |text: &str| {
+        message(
+            "[[problem.tasks]]",
+            &format!("[[problem.limits]]\n{text}\n\n[[problem.tasks]]"),
+        )
+    };
+    assert!(limits("joints = [\"LKneSag\"]").contains("did you mean `LKneeSag`?"));
+    let excluded = limits("joints = [\"LKneeSag\"]\nlower = 1.3");
+    assert!(
+        excluded.contains("joints.LKneeSag = 1.2") && excluded.contains("1.3 .. 1.9199"),
+        "{excluded}"
+    );
+    assert!(limits("lower = inf").contains("finite"));
+    assert!(limits("velocity = 0.0").contains("above 0"));
+    let reversed = limits("joints = [\"LKneeSag\"]\nlower = 2.5");
+    assert!(reversed.contains("lower <= upper"), "{reversed}");
+}
+
+#[test]
+fn robots_come_from_urdf_files_too() {
+    let folder = std::env::temp_dir().join(format!("ik-bench-suite-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let suite = |path: &str| {
+        format!(
+            "id = 'mine'\ntitle = ''\nanalysis = ''\ndt_s = 0.01\ncom_tolerance_m = 1.0\n[problem]\n\
+             robot = {{ urdf-file = {{ path = '{path}', root = 'fixed' }} }}\nboundary = {{ kind = 'box' }}\n\
+             [[problem.tasks]]\nname = 'joints'\ntrack = 'posture'\npriority = {{ compromised = {{ uniform = 1.0 }} }}\n\
+             [starts.zero]\n[[scenarios]]\nid = 'wave'\nduration_s = 0.1\nstart = 'zero'\n\
+             motion = [{{ task = 'joints', component = 'swing', shape = {{ offset = {{ value = 0.1 }} }} }}]\n"
+        )
+    };
+    let urdf = "<robot name='p'><link name='a'/><link name='b'/><joint name='swing' type='revolute'><parent link='a'/>\
+                <child link='b'/><axis xyz='0 1 0'/><limit lower='-1' upper='1' velocity='2' effort='1'/></joint></robot>";
+    std::fs::write(folder.join("good.urdf"), urdf).unwrap();
+    std::fs::write(folder.join("bad.urdf"), &urdf[..60]).unwrap();
+    let build = |path: &str| {
+        Suite::parse(&suite(path), "mine.toml", &folder).and_then(|s| Case::new(&s, 0, &Variation::default()))
+    };
+    let case = build("good.urdf").unwrap();
+    assert!(
+        matches!(&case.spec.robot, RobotSpec::Urdf { text, .. } if text == urdf),
+        "instances carry the text"
+    );
+    assert_eq!(case.samples.window(3).now().x, [0.1]);
+    let malformed = build("bad.urdf").unwrap_err().to_string();
+    assert!(
+        malformed.contains("bad.urdf") && malformed.contains("XML"),
+        "{malformed}"
+    );
+    let missing = build("none.urdf").unwrap_err().to_string();
+    assert!(
+        missing.contains("none.urdf") && missing.contains("cannot be read"),
+        "{missing}"
+    );
+    std::fs::remove_dir_all(&folder).unwrap();
+}

@@ -24,8 +24,11 @@ pub enum Rates {
 
 impl Rates {
     /// All of them by the words of suites and commands.
-    pub const WORDS: [(&'static str, Self); 3] =
-        [("analytic", Self::Analytic), ("difference", Self::Difference), ("zero", Self::Zero)];
+    pub const WORDS: [(&'static str, Self); 3] = [
+        ("analytic", Self::Analytic),
+        ("difference", Self::Difference),
+        ("zero", Self::Zero),
+    ];
 
     /// The word for it.
     pub fn word(self) -> &'static str {
@@ -72,7 +75,12 @@ impl Grid {
         crate::error::positive(place, "dt_s", dt_s)?;
         crate::error::positive(place, "duration_s", duration_s)?;
         if !(preview_s.is_finite() && preview_s >= 0.0) {
-            return Err(InputError::value(place, "preview_s", preview_s, "a finite number, not negative"));
+            return Err(InputError::value(
+                place,
+                "preview_s",
+                preview_s,
+                "a finite number, not negative",
+            ));
         }
         let steps = (duration_s / dt_s * (1.0 + STEP_SLACK)).floor();
         let preview = (preview_s / dt_s * (1.0 + STEP_SLACK)).floor();
@@ -80,8 +88,16 @@ impl Grid {
             let allowed = format!("at most duration_s = {duration_s}, and at most {MOST_STEPS} steps in all");
             return Err(InputError::value(place, "dt_s", dt_s, &allowed));
         }
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be 0 .. 1e6")]
-        Ok(Self { dt_s, steps: steps as usize, preview: preview as usize })
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "checked to be 0 .. 1e6"
+        )]
+        Ok(Self {
+            dt_s,
+            steps: steps as usize,
+            preview: preview as usize,
+        })
     }
 
     fn time(&self, k: usize) -> f64 {
@@ -124,7 +140,13 @@ impl Samples {
                 }
             }
         }
-        Ok(Self { data, nx, nxdot, steps: grid.steps, preview: grid.preview })
+        Ok(Self {
+            data,
+            nx,
+            nxdot,
+            steps: grid.steps,
+            preview: grid.preview,
+        })
     }
 
     /// N, the number of control steps.
@@ -149,11 +171,21 @@ impl Samples {
     }
 }
 
-fn check_finite(problem: &Problem, t: f64, value: &[f64], rate: &[f64], place: &str) -> Result<(), InputError> {
+fn check_finite(
+    problem: &Problem,
+    t: f64,
+    value: &[f64],
+    rate: &[f64],
+    place: &str,
+) -> Result<(), InputError> {
     let Some(row) = (0..value.len()).find(|&i| !(value[i].is_finite() && rate[i].is_finite())) else {
         return Ok(());
     };
-    let index = problem.slots().iter().rposition(|s| s.xdot <= row).expect("slots start at 0");
+    let index = problem
+        .slots()
+        .iter()
+        .rposition(|s| s.xdot <= row)
+        .expect("slots start at 0");
     let task = &problem.tasks()[index];
     let component = component_names(problem.robot(), &task.track)[row - problem.slots()[index].xdot];
     let field = format!("target {}.{component} at t = {t} s", task.name);
@@ -165,7 +197,10 @@ fn check_finite(problem: &Problem, t: f64, value: &[f64], rate: &[f64], place: &
 fn encode(problem: &Problem, value: &[f64], rate: &[f64], x: &mut [f64], xdot: &mut [f64]) {
     for (task, slot) in problem.tasks().iter().zip(problem.slots()) {
         let rows = task.track.rows(problem.robot());
-        let (value, rate) = (&value[slot.xdot..slot.xdot + rows], &rate[slot.xdot..slot.xdot + rows]);
+        let (value, rate) = (
+            &value[slot.xdot..slot.xdot + rows],
+            &rate[slot.xdot..slot.xdot + rows],
+        );
         let plain = turn_at(problem, &task.track).unwrap_or(rows);
         x[slot.x..slot.x + plain].copy_from_slice(&value[..plain]);
         xdot[slot.xdot..slot.xdot + plain].copy_from_slice(&rate[..plain]);

@@ -51,9 +51,11 @@ impl Shape {
         match *self {
             Self::Bump { amplitude, period_s } => amplitude * (1.0 - (TAU * t / period_s).cos()) / 2.0,
             Self::SmoothStep { amplitude, rise_s } => amplitude * smooth_step(t / rise_s),
-            Self::SmoothSine { amplitude, rise_s, period_s } => {
-                amplitude * smooth_step(t / rise_s) * (TAU * t / period_s).sin()
-            }
+            Self::SmoothSine {
+                amplitude,
+                rise_s,
+                period_s,
+            } => amplitude * smooth_step(t / rise_s) * (TAU * t / period_s).sin(),
             Self::Offset { value } | Self::Hold { value } => value,
         }
     }
@@ -63,7 +65,11 @@ impl Shape {
         match *self {
             Self::Bump { amplitude, period_s } => amplitude * PI / period_s * (TAU * t / period_s).sin(),
             Self::SmoothStep { amplitude, rise_s } => amplitude * smooth_step_slope(t / rise_s) / rise_s,
-            Self::SmoothSine { amplitude, rise_s, period_s } => {
+            Self::SmoothSine {
+                amplitude,
+                rise_s,
+                period_s,
+            } => {
                 let (sine, cosine) = (TAU * t / period_s).sin_cos();
                 let fading = smooth_step_slope(t / rise_s) / rise_s * sine;
                 amplitude * (fading + smooth_step(t / rise_s) * TAU / period_s * cosine)
@@ -88,7 +94,11 @@ impl Shape {
                 number("smooth-step.amplitude", amplitude)?;
                 time("smooth-step.rise_s", rise_s)
             }
-            Self::SmoothSine { amplitude, rise_s, period_s } => {
+            Self::SmoothSine {
+                amplitude,
+                rise_s,
+                period_s,
+            } => {
                 number("smooth-sine.amplitude", amplitude)?;
                 time("smooth-sine.rise_s", rise_s)?;
                 time("smooth-sine.period_s", period_s)
@@ -115,9 +125,19 @@ mod tests {
     use super::*;
 
     const SHAPES: [Shape; 5] = [
-        Shape::Bump { amplitude: 0.08, period_s: 2.0 },
-        Shape::SmoothStep { amplitude: 0.065, rise_s: 1.5 },
-        Shape::SmoothSine { amplitude: -0.2, rise_s: 1.0, period_s: 3.0 },
+        Shape::Bump {
+            amplitude: 0.08,
+            period_s: 2.0,
+        },
+        Shape::SmoothStep {
+            amplitude: 0.065,
+            rise_s: 1.5,
+        },
+        Shape::SmoothSine {
+            amplitude: -0.2,
+            rise_s: 1.0,
+            period_s: 3.0,
+        },
         Shape::Offset { value: 0.3 },
         Shape::Hold { value: -0.7 },
     ];
@@ -147,13 +167,26 @@ mod tests {
 
     #[test]
     fn numbers_that_cannot_be_are_refused_by_name() {
-        let bad = Shape::Bump { amplitude: f64::NAN, period_s: 1.0 };
-        let message = bad.check("s.toml", "scenarios[0].motion[1].shape").unwrap_err().to_string();
+        let bad = Shape::Bump {
+            amplitude: f64::NAN,
+            period_s: 1.0,
+        };
+        let message = bad
+            .check("s.toml", "scenarios[0].motion[1].shape")
+            .unwrap_err()
+            .to_string();
         assert_eq!(
             message,
             "s.toml: scenarios[0].motion[1].shape.bump.amplitude = NaN; allowed: a finite number"
         );
-        assert!(Shape::SmoothStep { amplitude: 1.0, rise_s: 0.0 }.check("", "").is_err());
+        assert!(
+            Shape::SmoothStep {
+                amplitude: 1.0,
+                rise_s: 0.0
+            }
+            .check("", "")
+            .is_err()
+        );
         assert!(Shape::Offset { value: f64::INFINITY }.check("", "").is_err());
     }
 }

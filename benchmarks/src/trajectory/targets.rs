@@ -69,7 +69,12 @@ impl Trajectory {
                 continue;
             };
             if held.contains(&term.row) {
-                return Err(InputError::value(place, &field, "a second hold", "one hold per component"));
+                return Err(InputError::value(
+                    place,
+                    &field,
+                    "a second hold",
+                    "one hold per component",
+                ));
             }
             held.push(term.row);
             base[term.row] = value;
@@ -94,7 +99,9 @@ impl Trajectory {
     }
 
     fn active(&self, t: f64) -> impl Iterator<Item = &Term> {
-        self.terms.iter().filter(move |term| term.from_s <= t && t < term.until_s)
+        self.terms
+            .iter()
+            .filter(move |term| term.from_s <= t && t < term.until_s)
     }
 }
 
@@ -102,7 +109,12 @@ fn term(problem: &Problem, spec: &MotionSpec, place: &str, field: &str) -> Resul
     let tasks = problem.tasks();
     let Some(index) = tasks.iter().position(|t| t.name == spec.task) else {
         let place = format!("{place}: {field}.task");
-        return Err(InputError::unknown(&place, "task", &spec.task, tasks.iter().map(|t| &t.name)));
+        return Err(InputError::unknown(
+            &place,
+            "task",
+            &spec.task,
+            tasks.iter().map(|t| &t.name),
+        ));
     };
     let names = component_names(problem.robot(), &tasks[index].track);
     let Some(component) = names.iter().position(|n| *n == spec.component) else {
@@ -114,13 +126,28 @@ fn term(problem: &Problem, spec: &MotionSpec, place: &str, field: &str) -> Resul
     let until_s = spec.until_s.unwrap_or(f64::INFINITY);
     let windowed = spec.from_s > 0.0 || spec.until_s.is_some();
     if windowed && matches!(spec.shape, Shape::Hold { .. }) {
-        return Err(InputError::value(place, field, "a hold with from_s or until_s", "a hold for the whole motion"));
+        return Err(InputError::value(
+            place,
+            field,
+            "a hold with from_s or until_s",
+            "a hold for the whole motion",
+        ));
     }
     if until_s.is_nan() || until_s <= spec.from_s {
         let allowed = format!("a number above from_s = {}", spec.from_s);
-        return Err(InputError::value(place, &format!("{field}.until_s"), until_s, &allowed));
+        return Err(InputError::value(
+            place,
+            &format!("{field}.until_s"),
+            until_s,
+            &allowed,
+        ));
     }
-    Ok(Term { row: problem.slots()[index].xdot + component, shape: spec.shape, from_s: spec.from_s, until_s })
+    Ok(Term {
+        row: problem.slots()[index].xdot + component,
+        shape: spec.shape,
+        from_s: spec.from_s,
+        until_s,
+    })
 }
 
 /// Names of the rows of a task, in their order.

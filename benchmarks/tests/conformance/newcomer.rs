@@ -140,7 +140,7 @@ impl Stepper for JacobianTransposeStepper {
             // (S3)
             difference_into(robot, step.q_prev, &out.q, &mut self.dq);
             for ((d, lo), hi) in self.dq.iter_mut().zip(step.bounds.lo).zip(step.bounds.hi) {
-                *d = d.max(*lo).min(*hi);
+                *d = d.clamp(*lo, *hi);
             }
             integrate_into(robot, step.q_prev, &self.dq, &mut self.q);
             if self.gradient.iter().all(|g| g.abs() < self.step_tolerance) {

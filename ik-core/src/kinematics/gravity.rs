@@ -49,16 +49,26 @@ pub fn static_torques_into(
     let root = Vector6::from_fn(|k, _| weight * page.com_jacobian[k][2]);
     let jacobians = supports.iter().map(|&f| RootJacobian::new(robot, page, f));
     // Least norm: w_i = R_i (Σ R_jᵀ R_j)⁻¹ g_root with R_i the 6 × 6 root columns of J_i.
-    let gram = jacobians.clone().fold(Matrix6::zeros(), |sum, j| sum + j.root.transpose() * j.root);
+    let gram = jacobians
+        .clone()
+        .fold(Matrix6::zeros(), |sum, j| sum + j.root.transpose() * j.root);
     let dual = gram.cholesky().ok_or(GravityError::Singular)?.solve(&root);
     for jacobian in jacobians {
         let wrench = jacobian.root * dual;
-        for_each_column(robot, page, jacobian.body, jacobian.point, |v, linear, angular| {
-            if v >= first {
-                let power = (0..3).map(|k| linear[k] * wrench[k] + angular[k] * wrench[3 + k]).sum::<f64>();
-                torque[v - first] -= power;
-            }
-        });
+        for_each_column(
+            robot,
+            page,
+            jacobian.body,
+            jacobian.point,
+            |v, linear, angular| {
+                if v >= first {
+                    let power = (0..3)
+                        .map(|k| linear[k] * wrench[k] + angular[k] * wrench[3 + k])
+                        .sum::<f64>();
+                    torque[v - first] -= power;
+                }
+            },
+        );
     }
     Ok(())
 }
@@ -81,6 +91,10 @@ impl RootJacobian {
                 root[(3 + k, v)] = angular[k];
             }
         });
-        Self { body: *body, point, root }
+        Self {
+            body: *body,
+            point,
+            root,
+        }
     }
 }

@@ -38,9 +38,9 @@ pub(crate) fn for_each_column(
 ) {
     if robot.root() == Root::Floating {
         let arm = lane::sub(p, page.bodies[0].origin);
-        for k in 0..3 {
-            write(k, AXES[k], ZERO);
-            write(3 + k, lane::cross(AXES[k], arm), AXES[k]);
+        for (k, axis) in AXES.into_iter().enumerate() {
+            write(k, axis, ZERO);
+            write(3 + k, lane::cross(axis, arm), axis);
         }
     }
     let first = robot.root().nv();
@@ -48,7 +48,11 @@ pub(crate) fn for_each_column(
         let joint = &robot.aligned[i];
         let (linear, angular) = joint_column(joint.motion, &page.bodies[i + 1], p);
         let m = joint.multiplier;
-        write(first + joint.coordinate, lane::scale(linear, m), lane::scale(angular, m));
+        write(
+            first + joint.coordinate,
+            lane::scale(linear, m),
+            lane::scale(angular, m),
+        );
     }
 }
 
@@ -65,8 +69,10 @@ pub fn frame_jacobian_into(robot: &Robot, page: &Page, frame: FrameId, axes: Axe
     };
     out.fill(0.0);
     for_each_column(robot, page, *body, pose.point(p_body), |v, linear, angular| {
-        let (linear, angular): (Vector3<f64>, Vector3<f64>) =
-            (to_axes * lane::to_vector(linear), to_axes * lane::to_vector(angular));
+        let (linear, angular): (Vector3<f64>, Vector3<f64>) = (
+            to_axes * lane::to_vector(linear),
+            to_axes * lane::to_vector(angular),
+        );
         let mut column = out.column_mut(v);
         for k in 0..3 {
             column[k] += linear[k];

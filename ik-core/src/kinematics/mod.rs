@@ -71,7 +71,12 @@ impl Page {
     pub fn new(robot: &Robot) -> Self {
         let bodies = robot.bodies().len();
         let joints = robot.joints().len();
-        let identity = BodyPose { x: AXES[0], y: AXES[1], z: AXES[2], origin: ZERO };
+        let identity = BodyPose {
+            x: AXES[0],
+            y: AXES[1],
+            z: AXES[2],
+            origin: ZERO,
+        };
         let mut subtree_mass: Vec<f64> = robot.aligned_bodies.iter().map(|(mass, _)| *mass).collect();
         if robot.root() == Root::Fixed {
             // Mass that cannot move is no part of the centre of mass.
@@ -137,13 +142,33 @@ pub fn forward(robot: &Robot, q: &[f64], page: &mut Page) {
 
 fn root_pose(robot: &Robot, q: &[f64]) -> BodyPose {
     match robot.root() {
-        Root::Fixed => BodyPose { x: AXES[0], y: AXES[1], z: AXES[2], origin: ZERO },
+        Root::Fixed => BodyPose {
+            x: AXES[0],
+            y: AXES[1],
+            z: AXES[2],
+            origin: ZERO,
+        },
         Root::Floating => {
             let (i, j, k, w) = (q[3], q[4], q[5], q[6]);
             BodyPose {
-                x: [1.0 - 2.0 * (j * j + k * k), 2.0 * (i * j + k * w), 2.0 * (i * k - j * w), 0.0],
-                y: [2.0 * (i * j - k * w), 1.0 - 2.0 * (i * i + k * k), 2.0 * (j * k + i * w), 0.0],
-                z: [2.0 * (i * k + j * w), 2.0 * (j * k - i * w), 1.0 - 2.0 * (i * i + j * j), 0.0],
+                x: [
+                    1.0 - 2.0 * (j * j + k * k),
+                    2.0 * (i * j + k * w),
+                    2.0 * (i * k - j * w),
+                    0.0,
+                ],
+                y: [
+                    2.0 * (i * j - k * w),
+                    1.0 - 2.0 * (i * i + k * k),
+                    2.0 * (j * k + i * w),
+                    0.0,
+                ],
+                z: [
+                    2.0 * (i * k + j * w),
+                    2.0 * (j * k - i * w),
+                    1.0 - 2.0 * (i * i + j * j),
+                    0.0,
+                ],
                 origin: lane::from_slice(q),
             }
         }
@@ -174,13 +199,23 @@ fn poses(robot: &Robot, q: &[f64], page: &mut Page) {
                     origin,
                 }
             }
-            Motion::Prismatic => BodyPose { x, y, z, origin: lane::add_scaled(origin, z, page.value[i]) },
+            Motion::Prismatic => BodyPose {
+                x,
+                y,
+                z,
+                origin: lane::add_scaled(origin, z, page.value[i]),
+            },
         };
     }
 }
 
 fn mass_moments(robot: &Robot, page: &mut Page) {
-    for ((pose, (mass, com)), moment) in page.bodies.iter().zip(&robot.aligned_bodies).zip(&mut page.moments) {
+    for ((pose, (mass, com)), moment) in page
+        .bodies
+        .iter()
+        .zip(&robot.aligned_bodies)
+        .zip(&mut page.moments)
+    {
         *moment = lane::scale(pose.point(com), *mass);
     }
     if robot.root() == Root::Fixed {
@@ -196,9 +231,9 @@ fn centre_of_mass_jacobian(robot: &Robot, page: &mut Page) {
     page.com_jacobian.fill(ZERO);
     if robot.root() == Root::Floating {
         let arm = lane::sub(page.com, page.bodies[0].origin);
-        for k in 0..3 {
-            page.com_jacobian[k] = AXES[k];
-            page.com_jacobian[3 + k] = lane::cross(AXES[k], arm);
+        for (k, axis) in AXES.into_iter().enumerate() {
+            page.com_jacobian[k] = axis;
+            page.com_jacobian[3 + k] = lane::cross(axis, arm);
         }
     }
     let first = robot.root().nv();

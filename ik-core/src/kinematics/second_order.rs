@@ -27,7 +27,10 @@ impl SecondOrder {
     /// Scratch for `robot`.
     pub fn new(robot: &Robot) -> Self {
         let n = robot.joints().len();
-        Self { omega: vec![ZERO; n], velocity: vec![ZERO; n] }
+        Self {
+            omega: vec![ZERO; n],
+            velocity: vec![ZERO; n],
+        }
     }
 
     /// For the frame point `p` on `body`: calls `write(v, linear, angular)` with the derivatives of `J_linear u` and
@@ -62,15 +65,19 @@ impl SecondOrder {
             // and z_i × z_i u_i vanishes.
             let turn = lane::cross(angular, lane::sub(omega, self.omega[i]));
             let m = joint.multiplier;
-            write(first + joint.coordinate, lane::scale(change, m), lane::scale(turn, m));
+            write(
+                first + joint.coordinate,
+                lane::scale(change, m),
+                lane::scale(turn, m),
+            );
         }
         if robot.root() == Root::Floating {
             let arm = lane::sub(p, page.bodies[0].origin);
             let behind = lane::sub(omega, root_omega);
-            for k in 0..3 {
-                let column = lane::cross(AXES[k], arm);
-                let change = lane::add(lane::cross(AXES[k], velocity), lane::cross(root_omega, column));
-                write(3 + k, change, lane::cross(AXES[k], behind));
+            for (k, axis) in AXES.into_iter().enumerate() {
+                let column = lane::cross(axis, arm);
+                let change = lane::add(lane::cross(axis, velocity), lane::cross(root_omega, column));
+                write(3 + k, change, lane::cross(axis, behind));
             }
         }
     }
@@ -93,7 +100,11 @@ impl SecondOrder {
                 parent => {
                     let j = &robot.aligned[parent - 1];
                     let rate = j.multiplier * u[first + j.coordinate];
-                    let z = if j.motion == Motion::Revolute { page.bodies[parent].z } else { ZERO };
+                    let z = if j.motion == Motion::Revolute {
+                        page.bodies[parent].z
+                    } else {
+                        ZERO
+                    };
                     (self.omega[parent - 1], lane::scale(z, rate))
                 }
             };
@@ -106,16 +117,23 @@ impl SecondOrder {
                 0 => root_velocity = lane::add(root_velocity, velocity),
                 parent => self.velocity[parent - 1] = lane::add(self.velocity[parent - 1], velocity),
             }
-            let z = if joint.motion == Motion::Revolute { page.bodies[i + 1].z } else { ZERO };
+            let z = if joint.motion == Motion::Revolute {
+                page.bodies[i + 1].z
+            } else {
+                ZERO
+            };
             let column = self.com_column(robot, page, i);
             let change = lane::add(lane::cross(z, velocity), lane::cross(self.omega[i], column));
             write(first + joint.coordinate, lane::scale(change, joint.multiplier));
         }
         if robot.root() == Root::Floating {
             let arm = lane::sub(page.com, page.bodies[0].origin);
-            for k in 0..3 {
-                let column = lane::cross(AXES[k], arm);
-                write(3 + k, lane::add(lane::cross(AXES[k], root_velocity), lane::cross(root_omega, column)));
+            for (k, axis) in AXES.into_iter().enumerate() {
+                let column = lane::cross(axis, arm);
+                write(
+                    3 + k,
+                    lane::add(lane::cross(axis, root_velocity), lane::cross(root_omega, column)),
+                );
             }
         }
     }

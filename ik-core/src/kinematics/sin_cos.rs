@@ -8,7 +8,11 @@
 /// The product of the quotient (20 bits here) with a 33-bit part of π/2 is exact up to this angle (rad).
 const LARGEST_REDUCED_RAD: f64 = 1.0e6;
 
-const HALF_PI: [f64; 3] = [1.570_796_326_734_125_6, 6.077_100_506_303_966e-11, 2.022_266_248_795_950_7e-21];
+const HALF_PI: [f64; 3] = [
+    1.570_796_326_734_125_6,
+    6.077_100_506_303_966e-11,
+    2.022_266_248_795_950_7e-21,
+];
 /// Adding and subtracting 1.5 · 2⁵² rounds to the nearest integer and leaves it in the low bits.
 const ROUNDING: f64 = 6_755_399_441_055_744.0;
 
@@ -70,7 +74,10 @@ mod tests {
         let mut c = vec![0.0; angles.len()];
         sin_cos_into(angles, &mut s, &mut c);
         for ((x, s), c) in angles.iter().zip(&s).zip(&c) {
-            assert!((s - x.sin()).abs() <= 2.3e-16 && (c - x.cos()).abs() <= 2.3e-16, "at {x}: {s} {c}");
+            assert!(
+                (s - x.sin()).abs() <= 2.3e-16 && (c - x.cos()).abs() <= 2.3e-16,
+                "at {x}: {s} {c}"
+            );
         }
     }
 

@@ -33,7 +33,12 @@ pub(crate) fn add_scaled(a: Lane, b: Lane, s: f64) -> Lane {
 
 #[inline(always)]
 pub(crate) fn cross(a: Lane, b: Lane) -> Lane {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0], 0.0]
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+        0.0,
+    ]
 }
 
 #[inline(always)]

@@ -57,7 +57,12 @@ impl RateMap {
     pub fn new(rpy: &Vector3<f64>) -> Self {
         let ((sine_pitch, cosine_pitch), (sine_yaw, cosine_yaw)) = (rpy.y.sin_cos(), rpy.z.sin_cos());
         let bounded = cosine_pitch.abs().max(LEAST_COSINE).copysign(cosine_pitch);
-        Self { sine_yaw, cosine_yaw, sine_pitch, inverse_cosine_pitch: 1.0 / bounded }
+        Self {
+            sine_yaw,
+            cosine_yaw,
+            sine_pitch,
+            inverse_cosine_pitch: 1.0 / bounded,
+        }
     }
 
     /// The map at the attitude of the rotation matrix `r`, without a trigonometric function.
@@ -90,7 +95,11 @@ impl RateMap {
         let i = self.inverse_cosine_pitch;
         let roll_dot = along_dot * i + along * self.sine_pitch * i * i * rpy_dot[1];
         // d(tan p · along) = along / cos² p · dp + tan p · d along.
-        [roll_dot, across_dot, along * i * i * rpy_dot[1] + self.sine_pitch * i * along_dot]
+        [
+            roll_dot,
+            across_dot,
+            along * i * i * rpy_dot[1] + self.sine_pitch * i * along_dot,
+        ]
     }
 }
 

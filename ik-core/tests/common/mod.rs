@@ -34,7 +34,10 @@ impl Random {
 }
 
 pub(crate) fn robots() -> Vec<Arc<Robot>> {
-    let mut robots: Vec<_> = EMBEDDED.iter().map(|e| Arc::new(embedded(e.id).unwrap())).collect();
+    let mut robots: Vec<_> = EMBEDDED
+        .iter()
+        .map(|e| Arc::new(embedded(e.id).unwrap()))
+        .collect();
     robots.push(Arc::new(mimic_gripper()));
     robots
 }
@@ -61,7 +64,11 @@ pub(crate) fn tracks(robot: &Robot) -> Vec<Track> {
     let last = robot.frames().len() - 1;
     let mut tracks = vec![Track::CentreOfMass, Track::Posture];
     for f in [last, last / 2, 0] {
-        tracks.extend([Track::Position(FrameId(f)), Track::Orientation(FrameId(f)), Track::Pose(FrameId(f))]);
+        tracks.extend([
+            Track::Position(FrameId(f)),
+            Track::Orientation(FrameId(f)),
+            Track::Pose(FrameId(f)),
+        ]);
     }
     tracks
 }
@@ -75,12 +82,21 @@ pub(crate) fn problem(
 ) -> Arc<Problem> {
     let parts = ProblemParts {
         robot: Arc::clone(robot),
-        tasks: vec![Task { name: "task".into(), track }],
-        phases: vec![Phase { name: "all".into(), tasks: vec![(0, priority)] }],
+        tasks: vec![Task {
+            name: "task".into(),
+            track,
+        }],
+        phases: vec![Phase {
+            name: "all".into(),
+            tasks: vec![(0, priority)],
+        }],
         boundary: Boundary::None,
         objectives: vec![],
         kind: Kind::Tracking,
-        supplies: Supplies { rates: true, preview_s: 0.0 },
+        supplies: Supplies {
+            rates: true,
+            preview_s: 0.0,
+        },
         orientation,
     };
     Arc::new(Problem::new(parts).unwrap())
@@ -92,5 +108,9 @@ pub(crate) fn weights(rows: usize) -> Weights {
         let off = 0.3 / (1.0 + (i as f64 - j as f64).abs());
         if i == j { 2.0 + 0.1 * i as f64 } else { off }
     };
-    Weights::Matrix((0..rows).map(|i| (0..rows).map(|j| entry(i, j)).collect()).collect())
+    Weights::Matrix(
+        (0..rows)
+            .map(|i| (0..rows).map(|j| entry(i, j)).collect())
+            .collect(),
+    )
 }

@@ -19,9 +19,7 @@ use crate::step_qp::{finish_unbounded, stay};
 use argmin::core::{CostFunction, Error, Gradient};
 use ik_core::configuration::integrate_into;
 use ik_core::evaluator::{Evaluator, Linearisation};
-use ik_core::formulation::{
-    Honours, Prepared, Solution, Stepper, Termination, Trust, Use,
-};
+use ik_core::formulation::{Honours, Prepared, Solution, Stepper, Termination, Trust, Use};
 use ik_core::problem::Problem;
 use ik_core::spatial::so3;
 use ik_core::step::ControlStep;
@@ -33,14 +31,20 @@ const PENALTY_FIELD: Field = Field {
     key: "penalty",
     unit: "-",
     meaning: "weight of hard rows and of limits against the compromised rows",
-    allowed: Allowed::Number { least: 1e-6, largest: 1e12 },
+    allowed: Allowed::Number {
+        least: 1e-6,
+        largest: 1e12,
+    },
 };
 
 const TOLERANCE_FIELD: Field = Field {
     key: "gradient_tolerance",
     unit: "m, rad",
     meaning: "a gradient norm below this counts as converged",
-    allowed: Allowed::Number { least: 1e-15, largest: 1.0 },
+    allowed: Allowed::Number {
+        least: 1e-15,
+        largest: 1.0,
+    },
 };
 
 /// The penalised problem of one step, as argmin wants it: cost and gradient through `&self`.
@@ -71,10 +75,13 @@ impl Penalised<'_> {
         let state = &mut *self.state.borrow_mut();
         let Scratch { lin, q, best } = &mut *state.scratch;
         integrate_into(self.problem.robot(), self.step.q_prev, d, q);
-        state.eval.linearise(q, self.step.phase, self.step.targets.now(), lin);
+        state
+            .eval
+            .linearise(q, self.step.phase, self.step.targets.now(), lin);
         let mut gradient = vec![0.0; d.len()];
         lin.soft.add_transposed(&lin.soft.error, 1.0, &mut gradient);
-        lin.hard.add_transposed(&lin.hard.error, self.penalty, &mut gradient);
+        lin.hard
+            .add_transposed(&lin.hard.error, self.penalty, &mut gradient);
         to_chart(self.problem, d, &mut gradient);
         let squares = |e: &[f64]| e.iter().map(|e| e * e).sum::<f64>();
         let mut cost = 0.5 * squares(&lin.soft.error) + 0.5 * self.penalty * squares(&lin.hard.error);
@@ -142,12 +149,24 @@ impl<O: Optimiser> Stepper for PenaltyStepper<O> {
         if most == 0 {
             return Termination::Budget;
         }
+        if !self.error_is_finite(step.q_prev, step, eval) {
+            // A line search of the optimiser would never return.
+            return Termination::Numerical("the cost is not finite");
+        }
         self.scratch.best.fill(0.0);
         let start = vec![0.0; self.problem.robot().nv()];
         let taken = {
-            let state = State { eval, scratch: &mut self.scratch, best_cost: f64::INFINITY };
-            let penalised =
-                Penalised { problem: &self.problem, step, penalty: self.penalty, state: RefCell::new(state) };
+            let state = State {
+                eval,
+                scratch: &mut self.scratch,
+                best_cost: f64::INFINITY,
+            };
+            let penalised = Penalised {
+                problem: &self.problem,
+                step,
+                penalty: self.penalty,
+                state: RefCell::new(state),
+            };
             self.optimiser.run(penalised, start, most)
         };
         for _ in 0..taken.clamp(1, most) {
@@ -155,25 +174,40 @@ impl<O: Optimiser> Stepper for PenaltyStepper<O> {
         }
         let best = self.scratch.best.clone();
         finish_unbounded(&self.problem, step, &best, out);
-        eval.linearise(&out.q, step.phase, step.targets.now(), &mut self.scratch.lin);
-        if self.scratch.lin.soft.error.iter().chain(&self.scratch.lin.hard.error).any(|e| !e.is_finite()) {
+        if !self.error_is_finite(&out.q, step, eval) {
             stay(step, out);
             return Termination::Numerical("the cost is not finite");
         }
         let converged = self.gradient_norm(step, &best) < self.gradient_tolerance;
-        if converged { Termination::Converged } else { Termination::Budget }
+        if converged {
+            Termination::Converged
+        } else {
+            Termination::Budget
+        }
     }
 
     fn reset(&mut self) {}
 }
 
 impl<O> PenaltyStepper<O> {
+    /// Linearises at `q`; false if an error is not a number there.
+    fn error_is_finite(&mut self, q: &[f64], step: &ControlStep<'_>, eval: &mut Evaluator) -> bool {
+        let lin = &mut self.scratch.lin;
+        eval.linearise(q, step.phase, step.targets.now(), lin);
+        lin.soft
+            .error
+            .iter()
+            .chain(&lin.hard.error)
+            .all(|e| e.is_finite())
+    }
+
     /// Norm of the penalised gradient at the linearised point.
     fn gradient_norm(&self, step: &ControlStep<'_>, d: &[f64]) -> f64 {
         let lin = &self.scratch.lin;
         let mut gradient = vec![0.0; d.len()];
         lin.soft.add_transposed(&lin.soft.error, 1.0, &mut gradient);
-        lin.hard.add_transposed(&lin.hard.error, self.penalty, &mut gradient);
+        lin.hard
+            .add_transposed(&lin.hard.error, self.penalty, &mut gradient);
         for (i, g) in gradient.iter_mut().enumerate() {
             *g += self.penalty * (d[i] - d[i].max(step.bounds.lo[i]).min(step.bounds.hi[i]));
         }

@@ -40,7 +40,11 @@ pub struct PenaltyCgParameters {
 
 impl Default for PenaltyCgParameters {
     fn default() -> Self {
-        Self { n: 15, penalty: 100.0, gradient_tolerance: 1e-9 }
+        Self {
+            n: 15,
+            penalty: 100.0,
+            gradient_tolerance: 1e-9,
+        }
     }
 }
 
@@ -70,7 +74,13 @@ impl Method for PenaltyCg {
 impl Formulation for PenaltyCg {
     fn prepare(&self, problem: &Arc<Problem>) -> Result<Prepared, Declined> {
         let p = &self.parameters;
-        Ok(prepare(problem, ConjugateGradient, p.n, p.penalty, p.gradient_tolerance))
+        Ok(prepare(
+            problem,
+            ConjugateGradient,
+            p.n,
+            p.penalty,
+            p.gradient_tolerance,
+        ))
     }
 }
 
@@ -87,6 +97,8 @@ impl Optimiser for ConjugateGradient {
             .timer(false)
             .run();
         // A failed line search ends the run; the best point is kept by the problem itself.
-        run.map_or(most, |result| u32::try_from(result.state().get_iter()).unwrap_or(most))
+        run.map_or(most, |result| {
+            u32::try_from(result.state().get_iter()).unwrap_or(most)
+        })
     }
 }

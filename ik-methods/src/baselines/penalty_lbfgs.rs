@@ -41,7 +41,12 @@ pub struct PenaltyLbfgsParameters {
 
 impl Default for PenaltyLbfgsParameters {
     fn default() -> Self {
-        Self { n: 15, penalty: 100.0, gradient_tolerance: 1e-9, memory: 7 }
+        Self {
+            n: 15,
+            penalty: 100.0,
+            gradient_tolerance: 1e-9,
+            memory: 7,
+        }
     }
 }
 
@@ -54,7 +59,10 @@ impl Parameters for PenaltyLbfgsParameters {
             key: "memory",
             unit: "-",
             meaning: "pairs of steps and gradient changes kept",
-            allowed: Allowed::Whole { least: 1, largest: 100 },
+            allowed: Allowed::Whole {
+                least: 1,
+                largest: 100,
+            },
         },
     ];
 }
@@ -81,7 +89,15 @@ impl Method for PenaltyLbfgs {
 impl Formulation for PenaltyLbfgs {
     fn prepare(&self, problem: &Arc<Problem>) -> Result<Prepared, Declined> {
         let p = &self.parameters;
-        Ok(prepare(problem, LimitedMemory { pairs: p.memory as usize }, p.n, p.penalty, p.gradient_tolerance))
+        Ok(prepare(
+            problem,
+            LimitedMemory {
+                pairs: p.memory as usize,
+            },
+            p.n,
+            p.penalty,
+            p.gradient_tolerance,
+        ))
     }
 }
 
@@ -99,6 +115,8 @@ impl Optimiser for LimitedMemory {
             .timer(false)
             .run();
         // A failed line search ends the run; the best point is kept by the problem itself.
-        run.map_or(most, |result| u32::try_from(result.state().get_iter()).unwrap_or(most))
+        run.map_or(most, |result| {
+            u32::try_from(result.state().get_iter()).unwrap_or(most)
+        })
     }
 }

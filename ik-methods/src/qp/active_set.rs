@@ -6,21 +6,29 @@
 //! 3. Hold the bounds that were active in the previous solve, go to the minimiser on them, let go of those
 //!    with the wrong sign, and continue with the dual method of Goldfarb and Idnani (`dual.rs`). A strictly
 //!    convex problem has one solution: warm and cold starts differ in work and rounding only.
-//! 4. Compute the true residual; while it is above rounding, correct and continue from 3. With a semidefinite
+//! 4. Compute the residual of the stationarity condition at the point; while it is above rounding, correct and continue from 3. With a semidefinite
 //!    H the factor carries a small proximal weight and the corrections are proximal-point steps.
 //! 5. Clip the rounding, recover the multipliers.
 //!
 //! Nothing is allocated after construction for problems up to the given size.
 
-use super::dual::{Dual, norm_max};
+use super::dual::Dual;
 use super::elimination::{DEPENDENT, Elimination, NEARLY_DEPENDENT, MAX_UNKNOWNS, Rows};
-use super::kernels::max_abs;
+use super::kernels::{max_abs, max_abs_or_nan};
 use super::reduced::Reduced;
 use super::{Qp, QpSolution, QpSolver, QpStatus};
 
 /// A reduced residual below this fraction of the gradient's terms is rounding: 100 times what the sums of
 /// about 20 terms leave.
 const CONVERGED: f64 = 1e-13;
+
+/// A residual below this fraction of what the terms of the point contribute to it is rounding of the point,
+/// some 50 units of it. This decides where the gradient itself vanishes at the solution.
+const POINT_ROUNDING: f64 = 1e-14;
+
+/// A point smaller than this fraction of its box counts as that large in rounding: a robot at rest, whose
+/// solution is zero, must not be refined down to denormal numbers.
+const REST: f64 = 1e-3;
 
 /// Residual up to which an answer that no longer improves is still called solved.
 const ACCEPTED: f64 = 1e-10;
@@ -112,33 +120,31 @@ impl ActiveSet {
     /// Steps 3 and 4.
     fn iterate(&mut self, qp: &Qp<'_>) -> QpStatus {
         let mut best = f64::INFINITY;
-        for _ in 0..CORRECTION_LIMIT {
+        for corrections_left in (0..CORRECTION_LIMIT).rev() {
             let status = self.dual.run(&self.reduced);
-            let doubtful = status == QpStatus::Infeasible && best == f64::INFINITY && self.is_doubtful();
+            let is_first = best == f64::INFINITY;
+            let doubtful = status == QpStatus::Infeasible && is_first && self.is_doubtful();
             if status != QpStatus::Solved && !doubtful {
                 return status;
             }
             let error = self.relative_residual(qp);
-            if error <= CONVERGED && !doubtful {
+            let has_stalled = error > 0.5 * best || corrections_left == 0;
+            if !doubtful && (error <= CONVERGED || (error <= ACCEPTED && has_stalled)) {
                 return QpStatus::Solved;
             }
             if !error.is_finite() {
-                return QpStatus::Numerical;
-            }
-            let stalled = error > 0.5 * best && error <= ACCEPTED;
-            if stalled && !doubtful {
-                return QpStatus::Solved;
+                break;
             }
             best = best.min(error);
             let residual = &mut self.residual[..self.reduced.unknowns()];
             self.dual.correct(&self.reduced, residual);
         }
-        if best <= ACCEPTED { QpStatus::Solved } else { QpStatus::Numerical }
+        QpStatus::Numerical
     }
 
     /// True if an infeasible verdict rests on a violation that drift of the point could explain.
     fn is_doubtful(&self) -> bool {
-        self.dual.worst_violation() <= CLEARLY_VIOLATED * self.dual.tolerance()
+        self.dual.is_inside(&self.reduced, CLEARLY_VIOLATED)
     }
 
     /// Residual of the reduced stationarity condition and of the members' bounds relative to their terms;
@@ -151,17 +157,29 @@ impl ActiveSet {
         for (out, &unknown) in self.at_positions.iter_mut().zip(&self.reduced.order) {
             *out = gradient[unknown];
         }
-        // The last term counts where the objective is zero: its multipliers are those of the proximal term.
-        let scale = max_abs(qp.g) + max_abs(gradient) + self.reduced.proximal_weight() * max_abs(&self.dual.x);
+        let scale = max_abs(qp.g) + max_abs(gradient);
         let residual = &mut self.residual[..self.reduced.unknowns()];
         self.reduced.project(&self.at_positions[..n], residual);
         self.dual.remove_multipliers(&self.reduced, residual);
-        let gap = self.dual.worst_member_gap();
-        let stationarity = norm_max(residual);
-        let stationarity = if stationarity > 0.0 { stationarity / scale } else { stationarity };
+        let mut stationarity = max_abs_or_nan(residual);
+        if stationarity > CONVERGED * scale {
+            let terms = self
+                .reduced
+                .gradient_terms(&qp.h, &self.dual.x, REST * self.dual.bound_scale());
+            stationarity = (stationarity - POINT_ROUNDING * terms).max(0.0);
+        }
+        let stationarity = if stationarity > 0.0 {
+            stationarity / scale
+        } else {
+            stationarity
+        };
         // A gap within the violation tolerance is no error; it is closed by putting members on their bounds.
-        let tolerance = self.dual.tolerance();
-        if gap > tolerance { stationarity.max(gap / tolerance * CONVERGED) } else { stationarity }
+        let gap = self.dual.worst_member_gap(&self.reduced);
+        if gap > 1.0 {
+            stationarity.max(gap * CONVERGED)
+        } else {
+            stationarity
+        }
     }
 
     /// Step 5: point clipped into the box and multipliers of an answer that is solved.
@@ -172,7 +190,8 @@ impl ActiveSet {
             out.z[self.reduced.order[position]] = z;
             self.at_positions[position] -= z;
         }
-        self.elimination.multipliers_into(&self.at_positions[..self.reduced.rank()], &mut out.y);
+        self.elimination
+            .multipliers_into(&self.at_positions[..self.reduced.rank()], &mut out.y);
     }
 
     fn write_point(&mut self, qp: &Qp<'_>, out: &mut QpSolution) {
@@ -194,7 +213,11 @@ impl ActiveSet {
         }
         self.reduced.load(&mut self.elimination);
         self.dual.load(&self.reduced, qp.lo, qp.hi);
-        let status = if rows == Rows::Consistent { self.minimise(qp) } else { QpStatus::Infeasible };
+        let status = if rows == Rows::Consistent {
+            self.minimise(qp)
+        } else {
+            QpStatus::Infeasible
+        };
         if status == QpStatus::Solved {
             self.write_multipliers(out);
         }
@@ -208,7 +231,8 @@ impl ActiveSet {
         if matches!(status, QpStatus::Solved | QpStatus::Infeasible) {
             let set = &self.dual.set;
             let members = set.positions.iter().zip(&set.signs);
-            self.warm.extend(members.map(|(&position, &sign)| (self.reduced.order[position], sign)));
+            self.warm
+                .extend(members.map(|(&position, &sign)| (self.reduced.order[position], sign)));
         }
     }
 }

@@ -99,8 +99,14 @@ fn status_of(status: SolverStatus) -> QpStatus {
 
 fn is_finite(qp: &Qp<'_>) -> bool {
     let columns = (0..qp.unknowns()).map(|j| qp.h.col(j));
-    let rows = (0..qp.unknowns()).filter(|_| qp.equalities() > 0).map(|j| qp.a.col(j));
-    columns.chain(rows).chain([qp.g, qp.b]).flatten().all(|value| value.is_finite())
+    let rows = (0..qp.unknowns())
+        .filter(|_| qp.equalities() > 0)
+        .map(|j| qp.a.col(j));
+    columns
+        .chain(rows)
+        .chain([qp.g, qp.b])
+        .flatten()
+        .all(|value| value.is_finite())
 }
 
 /// Rows in the order of the cones, and how many of them are equalities.
@@ -145,7 +151,10 @@ fn constraint_matrix(qp: &Qp<'_>, rows: &[Row]) -> (CscMatrix<f64>, Vec<f64>) {
             }
         }
     }
-    (CscMatrix::new_from_triplets(rows.len(), qp.unknowns(), triplets.0, triplets.1, triplets.2), rhs)
+    (
+        CscMatrix::new_from_triplets(rows.len(), qp.unknowns(), triplets.0, triplets.1, triplets.2),
+        rhs,
+    )
 }
 
 fn upper_triangle(qp: &Qp<'_>) -> CscMatrix<f64> {

@@ -11,17 +11,17 @@
 //! normals are recognised by a threshold on the part outside the span of the working set.
 
 use super::QpStatus;
-use super::kernels::{LANES, add_scaled, dot, max_abs, padded};
+use super::kernels::{LANES, add_scaled, max_abs, padded};
 use super::reduced::Reduced;
 use super::working_set::{Member, WorkingSet};
 
-/// A bound counts as violated beyond this fraction of the scale of the point.
+/// A bound counts as violated beyond this fraction of the box or of the terms its unknown is the sum of.
 ///
 /// Rounding of an eliminated unknown is about 2.2e-16 times the condition of the pivot block; this leaves
 /// three to four digits for it. Task rows and bounds themselves come with errors of 1e-16.
 const VIOLATION: f64 = 1e-12;
 
-/// Bounds beyond this size do not raise the scale of a point: in SI units and radians a tolerance above
+/// Bounds beyond this size do not raise the scale of the box: in SI units and radians a tolerance above
 /// 1e-12 would be visible.
 const LARGEST_BOUND_SCALE: f64 = 1.0;
 
@@ -94,7 +94,11 @@ impl Dual {
             self.lo[p] = if crossed { middle } else { lo[unknown] };
             self.hi[p] = if crossed { middle } else { hi[unknown] };
             for bound in [self.lo[p].abs(), self.hi[p].abs()] {
-                largest = if bound < f64::INFINITY { largest.max(bound) } else { largest };
+                largest = if bound < f64::INFINITY {
+                    largest.max(bound)
+                } else {
+                    largest
+                };
             }
         }
         self.bound_scale = largest.min(LARGEST_BOUND_SCALE);
@@ -104,15 +108,32 @@ impl Dual {
         reduced.complete(&mut self.x);
     }
 
-    /// Bound of `position` on the side of `sign`.
-    fn bound(&self, position: usize, sign: f64) -> f64 {
-        if sign > 0.0 { self.lo[position] } else { self.hi[position] }
+    /// Size of the box: largest finite bound, at most 1.
+    pub(super) fn bound_scale(&self) -> f64 {
+        self.bound_scale
     }
 
-    #[expect(clippy::float_cmp, reason = "only bounds that are the same number leave no room")]
+    /// Bound of `position` on the side of `sign`.
+    fn bound(&self, position: usize, sign: f64) -> f64 {
+        if sign > 0.0 {
+            self.lo[position]
+        } else {
+            self.hi[position]
+        }
+    }
+
+    #[expect(
+        clippy::float_cmp,
+        reason = "only bounds that are the same number leave no room"
+    )]
     fn member(&self, position: usize, sign: f64) -> Member {
         let fixed = self.lo[position] == self.hi[position];
-        Member { position, sign, multiplier: 0.0, fixed }
+        Member {
+            position,
+            sign,
+            multiplier: 0.0,
+            fixed,
+        }
     }
 
     /// Takes a bound into the working set without moving the point; dependent bounds are skipped.
@@ -126,25 +147,38 @@ impl Dual {
         let rest_sq = self.set.split(normal, &mut self.inside, outside);
         if rest_sq > 0.0 {
             let member = self.member(position, sign);
-            self.set.push(member, &self.inside, &self.outside[..k], rest_sq.sqrt());
+            self.set
+                .push(member, &self.inside, &self.outside[..k], rest_sq.sqrt());
         }
     }
 
     /// Subtracts what the members contribute from a reduced gradient.
     pub(super) fn remove_multipliers(&mut self, reduced: &Reduced, gradient: &mut [f64]) {
         let row = &mut self.normal[..gradient.len()];
-        for ((&position, sign), multiplier) in
-            self.set.positions.iter().zip(&self.set.signs).zip(&self.set.multipliers)
+        for ((&position, sign), multiplier) in self
+            .set
+            .positions
+            .iter()
+            .zip(&self.set.signs)
+            .zip(&self.set.multipliers)
         {
             reduced.bound_row_into(position, sign * multiplier, row);
             add_scaled(gradient, -1.0, row);
         }
     }
 
-    /// Largest distance of a member from its bound.
-    pub(super) fn worst_member_gap(&self) -> f64 {
-        let gaps = self.set.positions.iter().zip(&self.set.signs);
-        gaps.map(|(&p, &sign)| (self.bound(p, sign) - self.x[p]).abs()).fold(0.0, f64::max)
+    /// Largest distance of a member from its bound in units of what is rounding there.
+    pub(super) fn worst_member_gap(&self, reduced: &Reduced) -> f64 {
+        let members = self.set.positions.iter().zip(&self.set.signs);
+        let gaps = members.map(|(&p, &sign)| {
+            let gap = (self.bound(p, sign) - self.x[p]).abs();
+            if gap > 0.0 {
+                gap / self.tolerance(reduced, p)
+            } else {
+                0.0
+            }
+        });
+        gaps.fold(0.0, f64::max)
     }
 
     /// Moves to the minimiser on the working set, given the reduced gradient less the multipliers' part
@@ -198,7 +232,8 @@ impl Dual {
         let multiplier = self.set.multipliers[j];
         reduced.normal_into(self.set.positions[j], self.set.signs[j], &mut self.normal[..k]);
         self.set.remove(j);
-        self.set.split(&self.normal[..k], &mut self.inside, &mut self.outside[..k]);
+        self.set
+            .split(&self.normal[..k], &mut self.inside, &mut self.outside[..k]);
         add_scaled(step, -multiplier, &self.outside[..k]);
         self.set.solve_r(&mut self.inside);
         add_scaled(&mut self.set.multipliers, multiplier, &self.inside);
@@ -206,7 +241,7 @@ impl Dual {
 
     /// Adds violated bounds until there are none.
     pub(super) fn run(&mut self, reduced: &Reduced) -> QpStatus {
-        while let Some((position, sign)) = self.most_violated() {
+        while let Some((position, sign)) = self.most_violated(reduced) {
             let status = self.add(reduced, position, sign);
             if status != QpStatus::Solved {
                 return status;
@@ -215,37 +250,53 @@ impl Dual {
         QpStatus::Solved
     }
 
-    /// Violation beyond which a bound must be added.
-    pub(super) fn tolerance(&self) -> f64 {
-        VIOLATION * max_abs(&self.x[..self.n]).max(self.bound_scale)
+    /// Violation at `position` that is rounding.
+    fn tolerance(&self, reduced: &Reduced, position: usize) -> f64 {
+        VIOLATION * self.bound_scale.max(reduced.terms(&self.x, position))
+    }
+
+    /// True if no bound is violated by more than `factor` times what is rounding.
+    pub(super) fn is_inside(&self, reduced: &Reduced, factor: f64) -> bool {
+        let violation = |p: usize| (self.lo[p] - self.x[p]).max(self.x[p] - self.hi[p]);
+        (0..self.n).all(|p| violation(p) <= factor * self.tolerance(reduced, p))
     }
 
     /// Largest violation of any bound.
-    pub(super) fn worst_violation(&self) -> f64 {
+    fn worst_violation(&self) -> f64 {
         let mut worst = [0.0; LANES];
         let blocks = self.x.as_chunks::<LANES>().0.iter();
-        for ((x, lo), hi) in blocks.zip(self.lo.as_chunks::<LANES>().0).zip(self.hi.as_chunks::<LANES>().0) {
+        for ((x, lo), hi) in blocks
+            .zip(self.lo.as_chunks::<LANES>().0)
+            .zip(self.hi.as_chunks::<LANES>().0)
+        {
             for lane in 0..LANES {
                 let (below, above) = (lo[lane] - x[lane], x[lane] - hi[lane]);
                 let violation = if below > above { below } else { above };
-                worst[lane] = if violation > worst[lane] { violation } else { worst[lane] };
+                worst[lane] = if violation > worst[lane] {
+                    violation
+                } else {
+                    worst[lane]
+                };
             }
         }
         max_abs(&worst)
     }
 
     /// Most violated bound outside the working set: position and sign.
-    fn most_violated(&self) -> Option<(usize, f64)> {
-        let tolerance = self.tolerance();
-        if self.worst_violation() <= tolerance {
+    fn most_violated(&self, reduced: &Reduced) -> Option<(usize, f64)> {
+        let mut largest = VIOLATION * self.bound_scale;
+        if self.worst_violation() <= largest {
             return None;
         }
         let mut worst = None;
-        let mut largest = tolerance;
         for p in 0..self.n {
             let (below, above) = (self.lo[p] - self.x[p], self.x[p] - self.hi[p]);
-            let (violation, sign) = if below > above { (below, 1.0) } else { (above, -1.0) };
-            if violation > largest && !self.set.is_member[p] {
+            let (violation, sign) = if below > above {
+                (below, 1.0)
+            } else {
+                (above, -1.0)
+            };
+            if violation > largest && !self.set.is_member[p] && violation > self.tolerance(reduced, p) {
                 (worst, largest) = (Some((p, sign)), violation);
             }
         }
@@ -259,16 +310,21 @@ impl Dual {
         reduced.normal_into(position, sign, &mut self.normal[..k]);
         while self.minors < self.minor_limit {
             self.minors += 1;
-            let rest_sq = self.set.split(&self.normal[..k], &mut self.inside, &mut self.outside[..k]);
+            let rest_sq = self
+                .set
+                .split(&self.normal[..k], &mut self.inside, &mut self.outside[..k]);
             let w = self.set.len();
             self.rates[..w].copy_from_slice(&self.inside[..w]);
             self.set.solve_r(&mut self.rates);
             let violation = (sign * (self.bound(position, sign) - self.x[position])).max(0.0);
-            let full = if rest_sq > 0.0 { violation / rest_sq } else { f64::INFINITY };
+            let full = if rest_sq > 0.0 {
+                violation / rest_sq
+            } else {
+                f64::INFINITY
+            };
             let blocking = self.blocking().filter(|blocking| blocking.step < full);
             let step = blocking.map_or(full, |blocking| blocking.step);
             if step == f64::INFINITY {
-
                 return QpStatus::Infeasible;
             }
             self.shift_multipliers(step);
@@ -312,7 +368,8 @@ impl Dual {
     fn advance(&mut self, reduced: &Reduced, step: f64, is_full: bool, member: Member, rest_sq: f64) {
         let k = reduced.unknowns();
         if is_full {
-            self.set.push(member, &self.inside, &self.outside[..k], rest_sq.sqrt());
+            self.set
+                .push(member, &self.inside, &self.outside[..k], rest_sq.sqrt());
         }
         let direction = &mut self.outside[..k];
         reduced.solve_upper(direction);
@@ -327,10 +384,4 @@ impl Dual {
             self.x[position] = self.bound(position, self.set.signs[j]);
         }
     }
-}
-
-/// Size check of a residual vector: its largest magnitude, NaN if any entry is.
-pub(super) fn norm_max(x: &[f64]) -> f64 {
-    let poison = dot(x, x) * 0.0;
-    max_abs(x) + poison
 }

@@ -47,7 +47,7 @@ const SHARE: f64 = 1e-3;
 /// Weight of a bounded unknown in the choice of the pivot; unknowns without bounds count fully.
 ///
 /// Pivots without bounds can never become active. The factor limits entries of U to 1 / 0.25 (threshold
-/// pivoting); growth stays harmless in practice up to about 10 (Duff, Erisman & Reid, 2nd ed., 5.2).
+/// pivoting); growth stays harmless in practice up to about 10 (Duff, Erisman & Reid, Direct Methods for Sparse Matrices).
 const BOUNDED_WEIGHT: f64 = 0.25;
 
 /// Bits of a pivot key that hold the index of the candidate instead of the tail of its magnitude.
@@ -102,7 +102,7 @@ pub(super) struct Elimination {
     row_scale: Vec<f64>,
     /// A column of zeros: the padding of the rows.
     zeros: Vec<f64>,
-    /// Rows of (c, -T); later the right-hand side of the multipliers, by place.
+    /// Rows of (c, -T), some blocks at a time; later the right-hand side of the multipliers, by place.
     solution: Vec<f64>,
 }
 
@@ -139,12 +139,21 @@ impl Elimination {
     pub(super) fn run(&mut self, qp: &Qp<'_>, dependent: f64) -> Rows {
         self.dependent = dependent;
         self.load(qp);
-        if !self.row_scale[..self.m].iter().zip(qp.b).all(|(scale, b)| (scale + b.abs()).is_finite()) {
+        if !self.row_scale[..self.m]
+            .iter()
+            .zip(qp.b)
+            .all(|(scale, b)| (scale + b.abs()).is_finite())
+        {
             return Rows::NotFinite;
         }
         self.factorise();
-        self.remaining.extend((0..self.n).filter(|j| self.alive[j + 1] > 0.0));
-        if self.dependent_rows_hold(qp.b) { Rows::Consistent } else { Rows::Contradictory }
+        self.remaining
+            .extend((0..self.n).filter(|j| self.alive[j + 1] > 0.0));
+        if self.dependent_rows_hold(qp.b) {
+            Rows::Consistent
+        } else {
+            Rows::Contradictory
+        }
     }
 
     fn load(&mut self, qp: &Qp<'_>) {
@@ -217,7 +226,11 @@ impl Elimination {
     fn best_in_row(&self, row: usize) -> u64 {
         let row = &self.lower[row * self.ld..][..self.ld];
         let mut best = [0.0; LANES];
-        let blocks = row.as_chunks::<LANES>().0.iter().zip(self.weight.as_chunks::<LANES>().0);
+        let blocks = row
+            .as_chunks::<LANES>()
+            .0
+            .iter()
+            .zip(self.weight.as_chunks::<LANES>().0);
         for ((row, weight), places) in blocks.zip(self.place_bits.as_chunks::<LANES>().0) {
             for lane in 0..LANES {
                 // Magnitudes order like their bits, so the key can stay a float and be compared as one.
@@ -305,7 +318,9 @@ impl Elimination {
         (self.rank()..self.m).all(|row| {
             let lower = &self.lower[row * self.ld..][..self.ld];
             let pivots = self.pivots.iter().enumerate();
-            let eliminated: f64 = pivots.map(|(s, p)| (lower[p + 1] * self.upper[s * self.ld]).abs()).sum();
+            let eliminated: f64 = pivots
+                .map(|(s, p)| (lower[p + 1] * self.upper[s * self.ld]).abs())
+                .sum();
             let terms = CONSISTENT * (eliminated + b[self.rows[row]].abs());
             lower[0].abs() <= terms.max(SHARE * self.dependent * self.row_scale[row])
         })
@@ -318,43 +333,61 @@ impl Elimination {
         let width = padded(k + 1);
         self.kept_places.clear();
         self.kept_places.push(0);
-        self.kept_places.extend(self.remaining.iter().map(|unknown| unknown + 1));
+        self.kept_places
+            .extend(self.remaining.iter().map(|unknown| unknown + 1));
         self.kept_places.resize(width, 0);
-        for row in (0..rank).rev() {
-            for start in (0..width).step_by(GROUP * LANES) {
-                match (width - start) / LANES {
-                    1 => self.substitute::<1>(row, width, start),
-                    2 => self.substitute::<2>(row, width, start),
-                    3 => self.substitute::<3>(row, width, start),
-                    4 => self.substitute::<4>(row, width, start),
-                    _ => self.substitute::<GROUP>(row, width, start),
-                }
-            }
-        }
         let columns = &mut t_and_c[..stride * (k + 1)];
-        for (place, column) in columns.chunks_exact_mut(stride).enumerate() {
-            let (source, sign) = if place < k { (place + 1, -1.0) } else { (0, 1.0) };
-            for (row, out) in column[..rank].iter_mut().enumerate() {
-                *out = sign * self.solution[row * width + source];
+        columns.fill(0.0);
+        for start in (0..width).step_by(GROUP * LANES) {
+            match (width - start) / LANES {
+                1 => self.substitute::<1>(rank, start, stride, columns),
+                2 => self.substitute::<2>(rank, start, stride, columns),
+                3 => self.substitute::<3>(rank, start, stride, columns),
+                4 => self.substitute::<4>(rank, start, stride, columns),
+                _ => self.substitute::<GROUP>(rank, start, stride, columns),
             }
-            column[rank..].fill(0.0);
         }
     }
 
-    /// Row `row` of the solution, `BLOCKS` blocks from `start`: its row of U less the rows below, which are
-    /// known, times their entry of U. The newest row comes last.
-    #[inline]
-    fn substitute<const BLOCKS: usize>(&mut self, row: usize, width: usize, start: usize) {
-        let upper = &self.upper[row * self.ld..][..self.ld];
+    /// Back-substitution of `BLOCKS` blocks of kept places from `start` on, into the columns of T and c.
+    ///
+    /// A row of the solution is its row of U less the rows below times their entry of U, the newest last.
+    fn substitute<const BLOCKS: usize>(
+        &mut self,
+        rank: usize,
+        start: usize,
+        stride: usize,
+        columns: &mut [f64],
+    ) {
         let places = &self.kept_places[start..][..BLOCKS * LANES];
-        let mut sums: [[f64; LANES]; BLOCKS] =
-            std::array::from_fn(|block| std::array::from_fn(|lane| upper[places[block * LANES + lane]]));
-        for known in (row + 1..self.rank()).rev() {
-            let factor = upper[self.pivots[known] + 1];
-            let known = &self.solution[known * width + start..];
-            subtract_scaled_group::<BLOCKS>(sums.as_flattened_mut(), factor, known);
+        let rows = &mut self
+            .solution
+            .as_chunks_mut::<LANES>()
+            .0
+            .as_chunks_mut::<BLOCKS>()
+            .0[..rank];
+        for row in (0..rank).rev() {
+            let upper = &self.upper[row * self.ld..][..self.ld];
+            let mut sums: [[f64; LANES]; BLOCKS] =
+                std::array::from_fn(|block| std::array::from_fn(|lane| upper[places[block * LANES + lane]]));
+            for (known, pivot) in rows[row + 1..].iter().zip(&self.pivots[row + 1..]).rev() {
+                let factor = upper[pivot + 1];
+                for (sums, known) in sums.iter_mut().zip(known) {
+                    for lane in 0..LANES {
+                        sums[lane] -= factor * known[lane];
+                    }
+                }
+            }
+            rows[row] = sums;
         }
-        self.solution[row * width + start..][..BLOCKS * LANES].copy_from_slice(sums.as_flattened());
+        let k = self.remaining.len();
+        for (entry, place) in (start..=k).take(BLOCKS * LANES).enumerate() {
+            // Place 0 is c, the last column; the others are -T.
+            let (column, sign) = if place == 0 { (k, 1.0) } else { (place - 1, -1.0) };
+            for (out, row) in columns[column * stride..].iter_mut().zip(rows.iter()) {
+                *out = sign * row[entry / LANES][entry % LANES];
+            }
+        }
     }
 
     /// Solves A_Bᵀ y = q for the multipliers of the eliminated rows; redundant rows get 0.
@@ -411,4 +444,90 @@ fn sum_abs(x: &[f64]) -> f64 {
         }
     }
     sums.iter().sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 4 rows in 6 unknowns; row 2 is row 0 less twice row 1 plus `error`.
+    fn eliminate(error: f64, rhs_error: f64) -> (Rows, Elimination, Vec<f64>) {
+        let (m, n) = (4, 6);
+        let mut a: Vec<f64> = (0..m * n).map(|i| ((i * i + 3 * i) as f64 * 0.7).sin()).collect();
+        let mut b = vec![0.3, -0.2, 0.0, 0.9];
+        for j in 0..n {
+            a[2 + j * m] = a[j * m] - 2.0 * a[1 + j * m] + error * ((j as f64) + 0.5).cos();
+        }
+        b[2] = b[0] - 2.0 * b[1] + rhs_error;
+        let (lo, hi) = (vec![-1.0; n], vec![1.0; n]);
+        let zeros = vec![0.0; n * n];
+        let qp = Qp {
+            h: MatRef::new(&zeros, n, n),
+            g: &zeros[..n],
+            a: MatRef::new(&a, m, n),
+            b: &b,
+            lo: &lo,
+            hi: &hi,
+        };
+        let mut elimination = Elimination::new(n, m);
+        let rows = elimination.run(&qp, DEPENDENT);
+        a.extend(b);
+        (rows, elimination, a)
+    }
+
+    /// Every x = (c + T v, v) meets the rows.
+    fn worst_residual(elimination: &mut Elimination, a_and_b: &[f64]) -> f64 {
+        let (m, n, stride) = (4, 6, 4);
+        let mut t_and_c = vec![0.0; stride * (n + 1)];
+        elimination.solution_into(stride, &mut t_and_c);
+        let k = elimination.remaining.len();
+        let v: Vec<f64> = (0..k).map(|a| 0.4 - 0.3 * a as f64).collect();
+        let mut x = vec![0.0; n];
+        for (a, &unknown) in elimination.remaining.iter().enumerate() {
+            x[unknown] = v[a];
+        }
+        for (s, &unknown) in elimination.pivots.iter().enumerate() {
+            let moved: f64 = (0..k).map(|a| t_and_c[a * stride + s] * v[a]).sum();
+            x[unknown] = t_and_c[k * stride + s] + moved;
+        }
+        let row = |r: usize| (0..n).map(|j| a_and_b[r + j * m] * x[j]).sum::<f64>() - a_and_b[n * m + r];
+        (0..m).map(|r| row(r).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn redundant_row_is_found_and_met() {
+        let (rows, mut elimination, a_and_b) = eliminate(0.0, 0.0);
+        assert_eq!((rows, elimination.rank()), (Rows::Consistent, 3));
+        assert!(worst_residual(&mut elimination, &a_and_b) < 1e-14);
+    }
+
+    #[test]
+    fn nearly_dependent_row_is_kept_and_taken_last() {
+        let (rows, mut elimination, a_and_b) = eliminate(1e-8, 1e-9);
+        assert_eq!((rows, elimination.rank()), (Rows::Consistent, 4));
+        assert!(
+            [0, 1, 2].contains(&elimination.rows[3]),
+            "one of the three related rows is last"
+        );
+        assert!(worst_residual(&mut elimination, &a_and_b) < 1e-14);
+    }
+
+    #[test]
+    fn contradiction_is_found() {
+        assert_eq!(eliminate(0.0, 1e-6).0, Rows::Contradictory);
+    }
+
+    /// A_Bᵀ y = q, checked against the columns of A.
+    #[test]
+    fn multipliers_solve_the_transposed_system() {
+        let (_, mut elimination, a_and_b) = eliminate(0.0, 0.0);
+        let q = [0.5, -1.0, 0.25];
+        let mut y = [f64::NAN; 4];
+        elimination.multipliers_into(&q, &mut y);
+        for (pivot, expected) in elimination.pivots.iter().zip(q) {
+            let product: f64 = (0..4).map(|r| a_and_b[r + pivot * 4] * y[r]).sum();
+            assert!((product - expected).abs() < 1e-14);
+        }
+        assert!(y.contains(&0.0), "the redundant row has no multiplier");
+    }
 }

@@ -74,12 +74,34 @@ pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
             sums[lane] += x[lane] * y[lane];
         }
     }
-    let rest: f64 = x_rest.iter().zip(&y[y.len().min(x_blocks.len() * LANES)..]).map(|(x, y)| x * y).sum();
+    let rest: f64 = x_rest
+        .iter()
+        .zip(&y[y.len().min(x_blocks.len() * LANES)..])
+        .map(|(x, y)| x * y)
+        .sum();
     (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
 }
 
 /// Largest magnitude; NaN entries are ignored.
 #[inline]
 pub(super) fn max_abs(x: &[f64]) -> f64 {
-    x.iter().fold(0.0, |largest, value| if value.abs() > largest { value.abs() } else { largest })
+    x.iter().fold(0.0, |largest, value| {
+        if value.abs() > largest {
+            value.abs()
+        } else {
+            largest
+        }
+    })
+}
+
+/// Largest magnitude, NaN if any entry is NaN.
+#[inline]
+pub(super) fn max_abs_or_nan(x: &[f64]) -> f64 {
+    x.iter().fold(0.0, |largest: f64, value| {
+        if largest.is_nan() || value.abs() <= largest {
+            largest
+        } else {
+            value.abs()
+        }
+    })
 }

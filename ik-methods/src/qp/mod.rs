@@ -58,7 +58,12 @@ impl<'a> MatRef<'a> {
     /// The `rows x cols` matrix stored without gaps in `data`.
     #[must_use]
     pub fn new(data: &'a [f64], rows: usize, cols: usize) -> Self {
-        Self { data, rows, cols, ld: rows }
+        Self {
+            data,
+            rows,
+            cols,
+            ld: rows,
+        }
     }
 
     /// Column `j`, of length `rows`.
@@ -139,7 +144,12 @@ impl QpSolution {
     /// Zero answer for `n` unknowns and `m` equality rows.
     #[must_use]
     pub fn new(n: usize, m: usize) -> Self {
-        Self { x: vec![0.0; n], y: vec![0.0; m], z: vec![0.0; n], minors: 0 }
+        Self {
+            x: vec![0.0; n],
+            y: vec![0.0; m],
+            z: vec![0.0; n],
+            minors: 0,
+        }
     }
 
     /// Sets everything to zero in the size of `qp`; allocates only if the answer was smaller before.
@@ -193,7 +203,10 @@ pub struct KktResiduals {
     pub complementarity: f64,
     /// Largest |z_i| whose sign belongs to an infinite bound.
     pub dual_sign: f64,
-    /// Largest single term |(H x)_i|, |g_i|, |(Aᵀ y)_i|, |z_i| of the stationarity condition.
+    /// Largest sum of magnitudes |H_ij x_j| + |g_i| + |A_ri y_r| + |z_i| of a stationarity condition.
+    ///
+    /// Nearly dependent rows have large multipliers of opposite effect; a residual of rounding size in those
+    /// terms is what a backward-stable solver leaves.
     pub gradient_scale: f64,
     /// Largest |b_r| or sum of |A_rj x_j| of a row.
     pub row_scale: f64,
@@ -233,7 +246,10 @@ pub fn kkt_residuals(qp: &Qp<'_>, solution: &QpSolution) -> KktResiduals {
     for r in 0..qp.equalities() {
         let terms = || (0..qp.unknowns()).map(|j| qp.a.data[r + j * qp.a.ld] * solution.x[j]);
         out.equality = worse((terms().sum::<f64>() - qp.b[r]).abs(), out.equality);
-        out.row_scale = worse(terms().map(f64::abs).sum::<f64>().max(qp.b[r].abs()), out.row_scale);
+        out.row_scale = worse(
+            terms().map(f64::abs).sum::<f64>().max(qp.b[r].abs()),
+            out.row_scale,
+        );
     }
     out
 }
@@ -242,11 +258,20 @@ pub fn kkt_residuals(qp: &Qp<'_>, solution: &QpSolution) -> KktResiduals {
 fn unknown_residuals(qp: &Qp<'_>, solution: &QpSolution, i: usize, out: &mut KktResiduals) {
     let (x, z) = (solution.x[i], solution.z[i]);
     let hx = dot(qp.h.col(i), &solution.x);
-    let aty = if qp.equalities() > 0 { dot(qp.a.col(i), &solution.y) } else { 0.0 };
+    let aty = if qp.equalities() > 0 {
+        dot(qp.a.col(i), &solution.y)
+    } else {
+        0.0
+    };
     out.stationarity = worse((hx + qp.g[i] - aty - z).abs(), out.stationarity);
-    for term in [hx, qp.g[i], aty, z] {
-        out.gradient_scale = worse(term.abs(), out.gradient_scale);
-    }
+    let terms = |column: &[f64], v: &[f64]| column.iter().zip(v).map(|(a, v)| (a * v).abs()).sum::<f64>();
+    let row_terms = if qp.equalities() > 0 {
+        terms(qp.a.col(i), &solution.y)
+    } else {
+        0.0
+    };
+    let scale = terms(qp.h.col(i), &solution.x) + qp.g[i].abs() + row_terms + z.abs();
+    out.gradient_scale = worse(scale, out.gradient_scale);
     out.point_scale = worse(x.abs(), out.point_scale);
     out.bound = worse((qp.lo[i] - x).max(x - qp.hi[i]).max(0.0), out.bound);
     let distance = if z > 0.0 { x - qp.lo[i] } else { qp.hi[i] - x };

@@ -42,8 +42,8 @@ pub(super) struct Reduced {
     /// L, k x k, column-major, lower triangle.
     factor: Vec<f64>,
     inverse_diagonal: Vec<f64>,
-    /// eps, 0 where M is positive definite.
-    proximal_weight: f64,
+    /// Largest diagonal entry of M; where M is zero that of H, else the size of the gradient.
+    curvature: f64,
     /// Unknown at each position.
     pub(super) order: Vec<usize>,
 }
@@ -61,7 +61,7 @@ impl Reduced {
             gathered: vec![0.0; padded(n) + LANES],
             factor: vec![0.0; n * n],
             inverse_diagonal: vec![0.0; n],
-            proximal_weight: 0.0,
+            curvature: 0.0,
             order: Vec::with_capacity(n),
         }
     }
@@ -71,9 +71,12 @@ impl Reduced {
         self.k
     }
 
-    /// Weight eps of the proximal term in the factor, 0 if it is exact.
-    pub(super) fn proximal_weight(&self) -> f64 {
-        self.proximal_weight
+    /// Bound on what the terms of a point (in positions), at least `floor`, contribute to the reduced gradient.
+    ///
+    /// |Zᵀ H dx| is at most sqrt(|M| |H|) |dx| for a change dx of the point, and |M| |dv| for Z dv.
+    pub(super) fn gradient_terms(&self, h: &MatRef<'_>, x: &[f64], floor: f64) -> f64 {
+        let terms = (0..self.n).map(|p| self.terms(x, p)).fold(floor, f64::max);
+        (self.curvature * largest_diagonal(h)).sqrt() * terms + self.curvature * max_abs(&x[self.rank..])
     }
 
     /// Number of eliminated unknowns.
@@ -97,14 +100,17 @@ impl Reduced {
     pub(super) fn factorise(&mut self, qp: &Qp<'_>) -> bool {
         self.multiply_hessian(&qp.h, qp.g);
         let largest = self.assemble();
-        self.proximal_weight = 0.0;
+        self.curvature = if largest > 0.0 {
+            largest
+        } else {
+            fallback_curvature(qp)
+        };
         if self.cholesky(SAFE_PIVOT * largest) {
             return true;
         }
-        self.proximal_weight = PROXIMAL_WEIGHT * if largest > 0.0 { largest } else { fallback_scale(qp) };
         self.assemble();
         for a in 0..self.k {
-            self.factor[a * (self.k + 1)] += self.proximal_weight;
+            self.factor[a * (self.k + 1)] += PROXIMAL_WEIGHT * self.curvature;
         }
         self.cholesky(0.0)
     }
@@ -120,7 +126,12 @@ impl Reduced {
             // Beyond the rank T is zero, so any column of H will do there.
             let columns: [&[f64]; LANES] =
                 std::array::from_fn(|lane| h.col(self.order[(first + lane).min(rank - 1)]));
-            for (out, t) in self.hz.chunks_exact_mut(n).zip(self.t_and_c.chunks_exact(stride)).take(k + 1) {
+            for (out, t) in self
+                .hz
+                .chunks_exact_mut(n)
+                .zip(self.t_and_c.chunks_exact(stride))
+                .take(k + 1)
+            {
                 add_scaled4(out, std::array::from_fn(|lane| t[first + lane]), columns);
             }
         }
@@ -225,6 +236,21 @@ impl Reduced {
         self.add_t_times(&rest[..self.k], eliminated);
     }
 
+    /// Sum of the magnitudes x at `position` is made of: |c| + sum |T x_N|, or |x| itself.
+    pub(super) fn terms(&self, x: &[f64], position: usize) -> f64 {
+        if position >= self.rank {
+            return x[position].abs();
+        }
+        let rest = &x[self.rank..][..self.k];
+        let t = |a: usize| self.t_and_c[a * self.stride + position];
+        t(self.k).abs()
+            + rest
+                .iter()
+                .enumerate()
+                .map(|(a, v)| (t(a) * v).abs())
+                .sum::<f64>()
+    }
+
     fn add_t_times(&self, v: &[f64], eliminated: &mut [f64]) {
         let rank = eliminated.len();
         for (value, t) in v.iter().zip(self.t_and_c.chunks_exact(self.stride)) {
@@ -253,7 +279,11 @@ impl Reduced {
     /// Zᵀ times a gradient given in positions.
     pub(super) fn project(&self, gradient: &[f64], reduced: &mut [f64]) {
         let (eliminated, rest) = gradient.split_at(self.rank);
-        for ((value, rest), t) in reduced.iter_mut().zip(rest).zip(self.t_and_c.chunks_exact(self.stride)) {
+        for ((value, rest), t) in reduced
+            .iter_mut()
+            .zip(rest)
+            .zip(self.t_and_c.chunks_exact(self.stride))
+        {
             *value = rest + dot(eliminated, &t[..self.rank]);
         }
     }
@@ -267,9 +297,12 @@ fn gather(source: &[f64], order: &[usize], out: &mut [f64]) {
     out[order.len()..].fill(0.0);
 }
 
+fn largest_diagonal(h: &MatRef<'_>) -> f64 {
+    (0..h.cols).map(|j| h.col(j)[j]).fold(0.0, f64::max)
+}
+
 /// Curvature to compare with where M is zero: that of H itself, else the size of the gradient.
-fn fallback_scale(qp: &Qp<'_>) -> f64 {
-    let largest = (0..qp.unknowns()).map(|j| qp.h.col(j)[j]).fold(0.0, f64::max);
-    let scale = if largest > 0.0 { largest } else { max_abs(qp.g) };
-    if scale > 0.0 { scale } else { 1.0 }
+fn fallback_curvature(qp: &Qp<'_>) -> f64 {
+    let sizes = [largest_diagonal(&qp.h), max_abs(qp.g)];
+    sizes.into_iter().find(|size| *size > 0.0).unwrap_or(1.0)
 }

@@ -76,12 +76,19 @@ impl WorkingSet {
             return 0.0;
         }
         let rest_sq = dot(outside, outside);
-        if rest_sq > DEPENDENT_NORMAL * DEPENDENT_NORMAL * norm_sq { rest_sq } else { 0.0 }
+        if rest_sq > DEPENDENT_NORMAL * DEPENDENT_NORMAL * norm_sq {
+            rest_sq
+        } else {
+            0.0
+        }
     }
 
     /// One pass of Gram–Schmidt: inside += Qᵀ outside, outside <- (I - Q Qᵀ) outside.
     fn remove_span(&self, inside: &mut [f64], outside: &mut [f64]) {
-        for (inside, q) in inside[..self.len()].iter_mut().zip(self.q.chunks_exact(self.k.max(1))) {
+        for (inside, q) in inside[..self.len()]
+            .iter_mut()
+            .zip(self.q.chunks_exact(self.k.max(1)))
+        {
             let part = dot(q, outside);
             *inside += part;
             add_scaled(outside, -part, q);
@@ -113,15 +120,18 @@ impl WorkingSet {
         self.multipliers.remove(j);
         self.fixed.remove(j);
         for column in j + 1..w {
-            self.r.copy_within(column * k..column * k + column + 1, (column - 1) * k);
+            self.r
+                .copy_within(column * k..column * k + column + 1, (column - 1) * k);
         }
         for i in j..w - 1 {
             let (a, b) = (self.r[i * k + i], self.r[i * k + i + 1]);
             let length = a.hypot(b);
             let (cos, sin) = (a / length, b / length);
             for column in self.r.chunks_exact_mut(k).take(w - 1).skip(i) {
-                (column[i], column[i + 1]) =
-                    (cos * column[i] + sin * column[i + 1], cos * column[i + 1] - sin * column[i]);
+                (column[i], column[i + 1]) = (
+                    cos * column[i] + sin * column[i + 1],
+                    cos * column[i + 1] - sin * column[i],
+                );
             }
             let (left, right) = self.q.split_at_mut((i + 1) * k);
             for (left, right) in left[i * k..].iter_mut().zip(&mut right[..k]) {
@@ -157,7 +167,10 @@ impl WorkingSet {
 
     /// Qᵀ v.
     pub(super) fn q_transposed_times(&self, v: &[f64], out: &mut [f64]) {
-        for (out, q) in out[..self.len()].iter_mut().zip(self.q.chunks_exact(self.k.max(1))) {
+        for (out, q) in out[..self.len()]
+            .iter_mut()
+            .zip(self.q.chunks_exact(self.k.max(1)))
+        {
             *out = dot(q, v);
         }
     }
@@ -170,4 +183,89 @@ pub(super) struct Member {
     pub(super) sign: f64,
     pub(super) multiplier: f64,
     pub(super) fixed: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Deterministic numbers in [-1, 1] without structure.
+    fn normal(k: usize, index: usize) -> Vec<f64> {
+        (0..k)
+            .map(|i| ((i * 7 + index * 13 + i * index) as f64 * 1.618).sin())
+            .collect()
+    }
+
+    fn push(set: &mut WorkingSet, k: usize, index: usize) -> bool {
+        let (mut inside, mut outside) = (vec![0.0; k], vec![0.0; k]);
+        let rest_sq = set.split(&normal(k, index), &mut inside, &mut outside);
+        if rest_sq > 0.0 {
+            let member = Member {
+                position: index,
+                sign: 1.0,
+                multiplier: 0.0,
+                fixed: false,
+            };
+            set.push(member, &inside, &outside, rest_sq.sqrt());
+        }
+        rest_sq > 0.0
+    }
+
+    /// Qᵀ Q = I and Q R = the normals, after additions and removals.
+    #[test]
+    fn factor_survives_changes() {
+        let k = 6;
+        let mut set = WorkingSet::new(20);
+        set.clear(k);
+        for (add, remove) in [
+            (0, None),
+            (1, None),
+            (2, Some(0)),
+            (3, None),
+            (4, Some(1)),
+            (5, None),
+            (6, Some(2)),
+        ] {
+            assert!(push(&mut set, k, add));
+            if let Some(j) = remove {
+                set.remove(j);
+            }
+        }
+        assert_eq!(set.positions, [1, 3, 5, 6]);
+        for (j, &position) in set.positions.iter().enumerate() {
+            let mut product = vec![0.0; k];
+            set.add_q_times(
+                &set.r[j * k..][..j + 1]
+                    .iter()
+                    .copied()
+                    .chain([0.0; 6])
+                    .collect::<Vec<_>>(),
+                &mut product,
+            );
+            for (value, expected) in product.iter().zip(normal(k, position)) {
+                assert!((value - expected).abs() < 1e-14);
+            }
+            for i in 0..set.len() {
+                let inner = dot(&set.q[i * k..][..k], &set.q[j * k..][..k]);
+                assert!((inner - if i == j { 1.0 } else { 0.0 }).abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn dependent_normals_are_recognised() {
+        let k = 3;
+        let mut set = WorkingSet::new(20);
+        set.clear(k);
+        assert!(push(&mut set, k, 0) && push(&mut set, k, 1));
+        let (mut inside, mut outside) = (vec![0.0; k], vec![0.0; k]);
+        let combined: Vec<f64> = normal(k, 0)
+            .iter()
+            .zip(normal(k, 1))
+            .map(|(a, b)| 2.0 * a - b)
+            .collect();
+        assert!(set.split(&combined, &mut inside, &mut outside) <= 0.0);
+        assert!(push(&mut set, k, 2));
+        assert!(!push(&mut set, k, 3), "the space is full");
+    }
 }

@@ -1,0 +1,141 @@
+//! The table of the terminal.
+
+use super::{NONE, hard_max, number, seconds, suites, yes_no};
+use crate::figures::labels::{Labelled, by_method, labelled};
+use crate::records::{Metrics, Row};
+use std::fmt::Write as _;
+
+/// Columns of the terminal.
+pub const TERMINAL_WIDTH: usize = 100;
+/// In a suite with more scenarios than this the first is shown and the others are folded into one line per method.
+const UNFOLDED_SCENARIOS: usize = 3;
+
+/// One line of the terminal table: a run, or the worst of several.
+struct Line {
+    scenario: String,
+    method: String,
+    n: String,
+    values: Vec<String>,
+}
+
+/// Name and width of the columns of the terminal table; with a space between each they fill 98 columns.
+const TERMINAL: [(&str, usize); 12] = [
+    ("scenario", 13),
+    ("method", 15),
+    ("n", 3),
+    ("rms mm", 8),
+    ("max mm", 8),
+    ("hard", 8),
+    ("exit s", 6),
+    ("majors", 6),
+    ("us", 7),
+    ("x ik1", 6),
+    ("g<=0", 4),
+    ("ok", 5),
+];
+
+/// A table that fits [`TERMINAL_WIDTH`] columns.
+///
+/// Errors are in mm, `hard` is in m or rad, whichever is larger. In a suite with more than three scenarios the first is
+/// shown by itself and the others as one line per method: the worst of each value, the median of the times, and how many
+/// survived.
+pub fn terminal_table(rows: &[Row]) -> String {
+    let runs = labelled(rows);
+    let mut text = String::new();
+    for suite in suites(&runs) {
+        let of_suite: Vec<&Labelled<'_>> = runs.iter().filter(|r| r.row.suite == suite).collect();
+        text.push_str(&format!("\n{suite}\n"));
+        let header: Vec<String> = TERMINAL.iter().map(|c| c.0.to_owned()).collect();
+        push_line(&mut text, &header);
+        for line in terminal_lines(&of_suite) {
+            let mut line_cells = vec![line.scenario, line.method, line.n];
+            line_cells.extend(line.values);
+            push_line(&mut text, &line_cells);
+        }
+    }
+    text
+}
+
+fn push_line(text: &mut String, cells: &[String]) {
+    let mut line = String::new();
+    for (index, (cell, (_, width))) in cells.iter().zip(TERMINAL).enumerate() {
+        let short: String = cell.chars().take(width).collect();
+        let written = if index < 2 {
+            write!(line, "{short:<width$} ")
+        } else {
+            write!(line, "{short:>width$} ")
+        };
+        written.expect("writing to a String cannot fail");
+    }
+    text.push_str(line.trim_end());
+    text.push('\n');
+}
+
+fn terminal_lines(runs: &[&Labelled<'_>]) -> Vec<Line> {
+    let mut scenarios: Vec<&str> = Vec::new();
+    for run in runs {
+        if !scenarios.contains(&run.row.scenario.as_str()) {
+            scenarios.push(&run.row.scenario);
+        }
+    }
+    let unfolded = if scenarios.len() > UNFOLDED_SCENARIOS {
+        1
+    } else {
+        scenarios.len()
+    };
+    let mut lines: Vec<Line> = Vec::new();
+    for scenario in &scenarios[..unfolded] {
+        lines.extend(
+            runs.iter()
+                .filter(|r| r.row.scenario == *scenario)
+                .map(|r| line(scenario, &[r])),
+        );
+    }
+    let rest: Vec<&Labelled<'_>> = runs
+        .iter()
+        .copied()
+        .filter(|r| scenarios[unfolded..].contains(&r.row.scenario.as_str()))
+        .collect();
+    let name = format!("{} others", scenarios.len() - unfolded);
+    lines.extend(by_method(rest).iter().map(|group| line(&name, group)));
+    lines
+}
+
+fn line(scenario: &str, runs: &[&Labelled<'_>]) -> Line {
+    let metrics: Vec<&Metrics> = runs.iter().filter_map(|r| r.row.metrics.as_ref()).collect();
+    let worst =
+        |value: &dyn Fn(&Metrics) -> Option<f64>| metrics.iter().filter_map(|m| value(m)).reduce(f64::max);
+    let middle = |value: &dyn Fn(&Metrics) -> Option<f64>| {
+        crate::statistics::median(&mut metrics.iter().filter_map(|m| value(m)).collect::<Vec<_>>())
+    };
+    let survived = metrics.iter().filter(|m| m.quality.survived).count();
+    let inside = worst(&|m| m.quality.boundary_value_max).map_or(NONE, |g| yes_no(g <= INSIDE));
+    let ok = match runs {
+        [run] => run
+            .row
+            .metrics
+            .as_ref()
+            .map_or("decl.".to_owned(), |m| yes_no(m.quality.survived).to_owned()),
+        _ => format!("{survived}/{}", runs.len()),
+    };
+    let first = runs.first();
+    Line {
+        scenario: scenario.to_owned(),
+        method: first.map_or(String::new(), |r| r.label.clone()),
+        n: first.and_then(|r| r.n).map_or(NONE.to_owned(), |n| n.to_string()),
+        values: vec![
+            number(worst(&|m| m.quality.com_error_rms_m.map(|e| e * 1e3))),
+            number(worst(&|m| m.quality.com_error_max_m.map(|e| e * 1e3))),
+            worst(&|m| Some(hard_max(&m.quality))).map_or(NONE.to_owned(), |h| format!("{h:.1e}")),
+            seconds(worst(&|m| m.quality.singularity_exit_s)),
+            worst(&|m| Some(m.effort.majors_mean)).map_or(NONE.to_owned(), |m| format!("{m:.1}")),
+            number(middle(&|m| Some(m.effort.step_us_median))),
+            number(middle(&|m| m.effort.step_ratio_to_ik1)),
+            inside.to_owned(),
+            ok,
+        ],
+    }
+}
+
+/// Boundary value that counts as inside, as for `survived`.
+const INSIDE: f64 = 1e-4;

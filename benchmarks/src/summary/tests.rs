@@ -1,0 +1,150 @@
+use super::*;
+use crate::figures::synthetic::{folder, row, write_results};
+use crate::records::TerminationRecord;
+use crate::records_io::{ROWS_FILE, read_rows};
+
+fn full() -> Vec<Row> {
+    // Tests run side by side: each has its folder.
+    let dir = folder(&format!("summary-{:?}", std::thread::current().id()));
+    write_results(&dir);
+    let rows = read_rows(&dir.join(ROWS_FILE)).unwrap().rows;
+    std::fs::remove_dir_all(dir).unwrap();
+    rows
+}
+
+fn declined() -> Row {
+    let termination = TerminationRecord::Declined {
+        reason: "made up".to_owned(),
+    };
+    Row {
+        termination,
+        metrics: None,
+        ..row("penalty-cg", None, "coman/squat", "A")
+    }
+}
+
+#[test]
+fn numbers_have_three_digits() {
+    let expected = [
+        (0.0, "0"),
+        (1.46332e-3, "0.00146"),
+        (12.34, "12.3"),
+        (1234.5, "1234"),
+        (-2e-12, "-2.00e-12"),
+    ];
+    for (value, text) in expected {
+        assert_eq!(number(Some(value)), text);
+    }
+    assert_eq!(number(None), NONE);
+}
+
+#[test]
+fn the_terminal_table_fits_and_folds_large_suites() {
+    let mut rows = full();
+    rows.push(row(
+        "a-method-with-a-very-long-name",
+        Some(100),
+        "coman/squat",
+        "a-long-scenario-name",
+    ));
+    let table = terminal_table(&rows);
+    for line in table.lines() {
+        assert!(
+            line.chars().count() <= TERMINAL_WIDTH,
+            "{} columns: {line}",
+            line.chars().count()
+        );
+    }
+    let folded: Vec<&str> = table.lines().filter(|l| l.starts_with("12 others")).collect();
+    assert_eq!(folded.len(), 13, "{table}");
+    assert!(
+        folded.iter().any(|l| l.contains("ik4 ") && l.ends_with("6/12")),
+        "{table}"
+    );
+    assert!(!table.contains("C6_1_4"), "{table}");
+    assert!(table.lines().any(|l| l.starts_with("B1 ")), "{table}");
+    assert!(
+        table
+            .lines()
+            .any(|l| l.contains("penalty-cg") && l.ends_with("decl.")),
+        "{table}"
+    );
+}
+
+#[test]
+fn the_summary_has_a_table_and_the_analysis_per_suite() {
+    let mut lost = row("ik2", Some(3), "coman/lean", "D");
+    lost.metrics.as_mut().unwrap().quality.survived = false;
+    let rows = [row("ik1", None, "coman/squat", "A"), declined(), lost];
+    let analysis = BTreeMap::from([("coman/squat".to_owned(), "Why this squat.\n".to_owned())]);
+    let text = summary_markdown(&rows, &analysis);
+    assert!(
+        text.contains("revision 0123abc on made-up, 2 logical processors"),
+        "{text}"
+    );
+    assert!(
+        text.contains("## coman/squat\n\nWhy this squat.\n\n| scenario | method |"),
+        "{text}"
+    );
+    assert!(
+        text.contains("| A | ik1 | – | 1.50 | 2.20 | 3.33e-10 | – | -1.20e-12 | 53.0 |"),
+        "{text}"
+    );
+    assert!(
+        text.lines()
+            .any(|l| l.contains("penalty-cg") && l.ends_with("| declined |")),
+        "{text}"
+    );
+    assert!(
+        text.lines()
+            .any(|l| l.starts_with("| D | ik2 | 3 |") && l.ends_with("| NO |")),
+        "{text}"
+    );
+    let columns = |line: &str| line.matches('|').count();
+    let tables = text.lines().filter(|l| l.starts_with('|'));
+    assert!(tables.clone().all(|l| columns(l) == HEADER.len() + 1), "{text}");
+}
+
+#[test]
+fn the_readme_table_has_one_line_per_method_and_budget() {
+    let rows = full();
+    let table = readme_table(&rows);
+    let lines: Vec<&str> = table.lines().filter(|l| l.starts_with("| ik4 ")).collect();
+    assert_eq!(lines.len(), 4, "{table}");
+    assert!(lines[0].starts_with("| ik4 | 15 | 0.0346 |"), "{table}");
+    assert!(
+        lines[0].contains("| survives | 6/6 + 0/6 | survives | 31.0 | 6.20 |"),
+        "{table}"
+    );
+    assert!(
+        table
+            .lines()
+            .any(|l| l.starts_with("| penalty-cg |") && l.contains("| declined |")),
+        "{table}"
+    );
+    assert!(readme_table(&[]).lines().count() >= 2);
+}
+
+#[test]
+fn the_readme_table_goes_between_its_markers() {
+    let dir = folder("readme");
+    let readme = dir.join("README.md");
+    std::fs::write(
+        &readme,
+        format!("# Title\n\n{RESULTS_BEGIN}\n{RESULTS_END}\n\nEnd\n"),
+    )
+    .unwrap();
+    let rows = [row("ik1", None, "coman/squat", "A")];
+    replace_readme_table(&readme, &rows).unwrap();
+    let text = std::fs::read_to_string(&readme).unwrap();
+    assert!(
+        text.contains(&readme_table(&rows)) && text.ends_with("\n\nEnd\n"),
+        "{text}"
+    );
+    let summary = write_summary(&dir, &rows, &BTreeMap::new()).unwrap();
+    assert_eq!(
+        std::fs::read_to_string(summary).unwrap(),
+        summary_markdown(&rows, &BTreeMap::new())
+    );
+    std::fs::remove_dir_all(dir).unwrap();
+}

@@ -1,0 +1,359 @@
+//! The real program: what it refuses and how, and one small run from suite to figures.
+
+#![allow(clippy::unwrap_used, reason = "tests want to stop at the first surprise")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A folder of one test, removed at its end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(test: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("ik-bench-cli-{}-{test}", std::process::id()));
+        fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn write(&self, name: &str, text: &str) -> String {
+        let path = self.0.join(name);
+        fs::write(&path, text).unwrap();
+        path.display().to_string()
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.join(name).display().to_string()
+    }
+
+    /// Runs the program in this folder.
+    fn run(&self, arguments: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_ik-bench"))
+            .args(arguments)
+            .current_dir(&self.0)
+            .output()
+            .unwrap()
+    }
+
+    fn succeed(&self, arguments: &[&str]) -> String {
+        let output = self.run(arguments);
+        let (text, errors) = (
+            String::from_utf8_lossy(&output.stdout),
+            String::from_utf8_lossy(&output.stderr),
+        );
+        assert!(output.status.success(), "{arguments:?}: {errors}");
+        assert!(errors.is_empty(), "no progress bar outside a terminal: {errors}");
+        text.into_owned()
+    }
+
+    /// Expects exit code 2, one message with all `words`, nothing on stdout and nothing in the folder `out`.
+    fn refuse(&self, arguments: &[&str], words: &[&str]) {
+        let output = self.run(arguments);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+        assert!(
+            message.starts_with("error: ") && message.matches("error:").count() == 1,
+            "{message}"
+        );
+        assert!(!message.contains("panicked"), "{message}");
+        for word in words {
+            assert!(
+                message.contains(word),
+                "{arguments:?}: `{word}` is missing in: {message}"
+            );
+        }
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+        assert!(
+            !Path::new(&self.path("out")).exists(),
+            "{arguments:?} wrote something"
+        );
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // A leftover in the folder for temporary files harms nobody.
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// The squat, a twentieth of a second long.
+fn short_squat() -> String {
+    let text = include_str!("../suites/coman/squat.toml");
+    text.replace("duration_s = 3.0", "duration_s = 0.05")
+        .replace("coman/squat", "short/squat")
+}
+
+#[test]
+fn unknown_names_are_refused() {
+    let folder = Folder::new("names");
+    let refuse = |arguments: &[&str], words: &[&str]| {
+        folder.refuse(&[arguments, &["--out", "out"]].concat(), words);
+    };
+    refuse(
+        &["run", "coman/squad"],
+        &["suite `coman/squad`", "did you mean `coman/squat`?", "coman/lean"],
+    );
+    refuse(&["run", "nowhere.toml"], &["nowhere.toml", "cannot be read"]);
+    refuse(
+        &["run", "coman/squat", "--method", "ik44"],
+        &["method `ik44`", "did you mean `ik4`?", "penalty-cg"],
+    );
+    refuse(
+        &["run", "coman/squat", "--set", "gama=3"],
+        &["parameter `gama`", "did you mean `gamma`?"],
+    );
+    refuse(
+        &["run", "coman/squat", "--method", "ik1", "--set", "gamma=3"],
+        &["parameter `gamma`", "damping"],
+    );
+    refuse(
+        &["run", "coman/squat", "--set", "gamma"],
+        &["--set = gamma", "KEY=VALUE"],
+    );
+    refuse(
+        &["run", "coman/squat", "--set", "gamma=-1"],
+        &["`gamma`", "-1", "allowed"],
+    );
+    refuse(
+        &["run", "coman/squat", "--set", "gamma=nan"],
+        &["`gamma`", "nan", "allowed"],
+    );
+    refuse(
+        &["run", "coman/squat", "--set", "rows=most"],
+        &["`rows`", "most", "literal"],
+    );
+    let robot = short_squat().replace("coman-legs", "coman-lex");
+    let robot = folder.write("robot.toml", &robot);
+    refuse(
+        &["run", &robot],
+        &["robot.toml", "robot `coman-lex`", "did you mean `coman-legs`?"],
+    );
+}
+
+#[test]
+fn numbers_that_cannot_be_are_refused() {
+    let folder = Folder::new("numbers");
+    for (dt, words) in [
+        ("0", "dt_s = 0"),
+        ("-0.005", "dt_s = -0.005"),
+        ("nan", "dt_s = NaN"),
+        ("1e-12", "dt_s = 0.00"),
+    ] {
+        let dt = format!("--dt={dt}");
+        folder.refuse(&["run", "coman/squat", &dt, "--out", "out"], &[words, "allowed"]);
+    }
+    folder.refuse(
+        &["run", "coman/squat", "--dt", "fast", "--out", "out"],
+        &["--dt", "fast"],
+    );
+    folder.refuse(
+        &["run", "coman/boundary", "--dt", "0.2", "--out", "out"],
+        &["dt_s = 0.2", "0.125"],
+    );
+    folder.refuse(
+        &["run", "coman/squat", "--margin", "3", "--out", "out"],
+        &["margin = 3"],
+    );
+    folder.refuse(
+        &["run", "coman/squat", "--velocity", "0", "--out", "out"],
+        &["velocity = 0", "above 0"],
+    );
+    folder.refuse(
+        &["run", "coman/squat", "--rates", "exact", "--out", "out"],
+        &["exact", "analytic"],
+    );
+    let step = ["run", "coman/squat", "--out", "out", "--dump-step", "601"];
+    folder.refuse(&step, &["--dump-step = 601", "1 .. 600"]);
+    folder.refuse(&["run", "coman/squat", "--dump-step", "6"], &["--out"]);
+}
+
+#[test]
+fn bad_suites_are_refused() {
+    let folder = Folder::new("suites");
+    let refuse = |from: &str, to: &str, words: &[&str]| {
+        assert!(short_squat().contains(from), "{from}");
+        let suite = folder.write("mine.toml", &short_squat().replacen(from, to, 1));
+        folder.refuse(
+            &["run", &suite, "--out", "out", "--trace"],
+            &[&["mine.toml"], words].concat(),
+        );
+    };
+    refuse("dt_s = 0.005", "dt_s = = 0.005", &["line"]);
+    refuse(
+        "dt_s = 0.005",
+        "speed = 1\ndt_s = 0.005",
+        &["line", "unknown field `speed`"],
+    );
+    refuse(
+        "amplitude = 0.03",
+        "amplitude = nan",
+        &["motion[0].shape.bump.amplitude = NaN", "finite"],
+    );
+    refuse(
+        "amplitude = 0.03",
+        "amplitude = inf",
+        &["motion[0].shape.bump.amplitude = inf", "finite"],
+    );
+    refuse(
+        "joints.LKneeSag = 1.2",
+        "joints.LKneeSag = -0.1",
+        &["joints.LKneeSag = -0.1", "0 .. 1.9199"],
+    );
+    refuse(
+        "uniform = 1.0",
+        "diagonal = [1.0, 2.0]",
+        &["com", "2 entries", "3 entries"],
+    );
+    let bad = "robot = { urdf-file = { path = 'bad.urdf', root = 'floating' } }";
+    folder.write("bad.urdf", "<robot name='r'>\n<link name='a'>\n</robot>");
+    refuse(
+        "robot = { embedded = \"coman-legs\" }",
+        bad,
+        &["bad.urdf", "malformed XML"],
+    );
+    folder.write(
+        "bad.urdf",
+        "<robot name='r'>\n<link name='a'/>\n<link name='b'/>\n</robot>",
+    );
+    refuse(
+        "robot = { embedded = \"coman-legs\" }",
+        bad,
+        &["bad.urdf", "no parent", "a, b"],
+    );
+}
+
+#[test]
+fn bad_instances_and_folders_are_refused() {
+    let folder = Folder::new("instances");
+    folder.refuse(&["solve", "none.json"], &["none.json", "cannot be read"]);
+    let broken = folder.write("broken.json", "{\"schema\": \"ik-bench/instance/1\", ");
+    folder.refuse(&["solve", &broken], &["broken.json", "line 1 column"]);
+    let nan = folder.write("nan.json", "{\"schema\": NaN}");
+    folder.refuse(&["solve", &nan], &["nan.json", "line 1 column"]);
+    folder.refuse(&["figures", "nowhere"], &["nowhere"]);
+    folder.refuse(&["readme", "nowhere", "README.md"], &["nowhere"]);
+    folder.refuse(&["list", "animals"], &["animals", "methods"]);
+    folder.refuse(&["--quick", "--bogus"], &["--bogus"]);
+}
+
+#[test]
+fn lists_name_what_there_is() {
+    let folder = Folder::new("lists");
+    let methods = folder.succeed(&["list", "methods"]);
+    for words in [
+        "ik1:",
+        "ik5:",
+        "penalty-lbfgs:",
+        "--set gamma=10.0",
+        "a whole number from 1",
+        "\"literal\"",
+    ] {
+        assert!(methods.contains(words), "`{words}` is missing in: {methods}");
+    }
+    let suites = folder.succeed(&["list", "suites"]);
+    assert!(
+        suites.contains("coman/asymmetric") && suites.contains("C8_2_3"),
+        "{suites}"
+    );
+    assert!(folder.succeed(&["list", "robots"]).contains("coman-legs"));
+}
+
+#[test]
+fn without_a_folder_a_run_shows_its_table_and_writes_nothing() {
+    let folder = Folder::new("table");
+    let suite = folder.write("short.toml", &short_squat());
+    let text = folder.succeed(&["run", &suite, "--method", "ik1,ik5", "--set", "n=4", "--quick"]);
+    assert!(text.contains("short/squat") && text.contains("ik5"), "{text}");
+    assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+    assert_eq!(
+        fs::read_dir(&folder.0).unwrap().count(),
+        1,
+        "only the suite is there"
+    );
+}
+
+#[test]
+fn a_run_leaves_rows_traces_and_steps_that_replay() {
+    let folder = Folder::new("run");
+    let suite = folder.write("short.toml", &short_squat());
+    let run = [
+        "run",
+        &suite,
+        "--method",
+        "ik1",
+        "--method",
+        "ik4",
+        "--out",
+        "out",
+        "--trace",
+        "--dump-step",
+        "7",
+    ];
+    folder.succeed(&run);
+    let rows = rows(&folder);
+    assert_eq!(rows.len(), 4, "ik1, and ik4 with n = 15, n = 3 and literal rows");
+    for row in &rows {
+        assert_eq!(row["suite"], "short/squat");
+        assert!(row["metrics"]["com_error_rms_m"].as_f64().unwrap() < 1e-3);
+        assert!(row["metrics"]["step_ratio_to_ik1"].as_f64().unwrap() > 0.0);
+        let trace = fs::read_to_string(folder.0.join("out").join(row["trace"].as_str().unwrap())).unwrap();
+        assert_eq!(trace.lines().count(), 12, "a header and samples 0 .. 10");
+        replay(&folder, row, &trace);
+    }
+    folder.succeed(&["figures", "out"]);
+    let readme = folder.write(
+        "README.md",
+        "a\n<!-- results:begin -->\nold\n<!-- results:end -->\nb\n",
+    );
+    folder.succeed(&["readme", "out", &readme]);
+    let text = fs::read_to_string(&readme).unwrap();
+    assert!(
+        text.contains("| method |") && !text.contains("old") && text.ends_with("b\n"),
+        "{text}"
+    );
+    folder.succeed(&["run", &suite, "--method", "ik1", "--out", "out", "--fresh"]);
+    assert_eq!(self::rows(&folder).len(), 1, "--fresh starts over");
+}
+
+fn rows(folder: &Folder) -> Vec<serde_json::Value> {
+    let text = fs::read_to_string(folder.0.join("out/runs.jsonl")).unwrap();
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+/// Solves the dumped step 7 of a row's run and compares its q with line 7 of the trace, digit by digit.
+fn replay(folder: &Folder, row: &serde_json::Value, trace: &str) {
+    let stem = row["trace"]
+        .as_str()
+        .unwrap()
+        .trim_start_matches("traces/")
+        .trim_end_matches(".csv");
+    let instance = format!("out/instances/{stem}_step-7.json");
+    let answer: serde_json::Value = serde_json::from_str(&folder.succeed(&["solve", &instance])).unwrap();
+    let found: Vec<f64> = answer["q"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|v| v.as_f64().unwrap())
+        .collect();
+    let line = trace.lines().nth(8).unwrap();
+    let expected: Vec<f64> = line
+        .split(',')
+        .skip(1)
+        .take(19)
+        .map(|v| v.parse().unwrap())
+        .collect();
+    let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(&found), bits(&expected), "{stem}");
+    let other: serde_json::Value =
+        serde_json::from_str(&folder.succeed(&["solve", &instance, "--method", "ik5"])).unwrap();
+    assert_eq!(other["method"], "ik5");
+    let refused = folder.run(&["solve", &instance, "--method", "ik4", "--set", "n=0.5"]);
+    let message = String::from_utf8_lossy(&refused.stderr);
+    assert!(
+        refused.status.code() == Some(2) && message.contains("`n`") && message.contains("0.5"),
+        "{message}"
+    );
+}
