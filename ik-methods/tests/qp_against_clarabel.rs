@@ -332,8 +332,13 @@ fn ik_like_problems_with_dependent_rows() {
     });
 }
 
+/// Rows of scale 1 whose remainder is below 1e-7 count as dependent: unknowns that move by some 0.02 then miss them by at
+/// most 2e-9.
+const DROPPED_ROW: f64 = 2e-9;
+
 /// With a singular value of 1e-9 the box decides within rounding of the rows whether there is a solution.
-/// The lexicographic solver must come back with rows met to rounding whatever the verdict.
+/// The lexicographic solver must come back with rows met but for the remainder that it leaves out, whatever the
+/// verdict.
 #[test]
 fn ik_like_problems_with_nearly_dependent_rows() {
     let mut relaxed = 0;
@@ -343,7 +348,10 @@ fn ik_like_problems_with_nearly_dependent_rows() {
         let outcome = Lexicographic::new(problem.n, problem.m).solve(&problem.view(), &mut out);
         let residuals = kkt_residuals(&problem.view(), &out);
         assert_eq!(residuals.bound, 0.0, "{seed}");
-        assert!(residuals.equality < 1e-11, "{seed}: {outcome:?} {residuals:?}");
+        assert!(
+            residuals.equality < DROPPED_ROW,
+            "{seed}: {outcome:?} {residuals:?}"
+        );
         relaxed += usize::from(outcome != Outcome::Solved);
     }
     println!("nearly dependent rows: {relaxed} of 500 not called solved");
@@ -351,7 +359,7 @@ fn ik_like_problems_with_nearly_dependent_rows() {
 }
 
 /// The worst of it: nearly dependent rows met by a point on many bounds at once. Rounding of the data decides
-/// whether a solution exists; the lexicographic solver must meet the rows to rounding all the same.
+/// whether a solution exists; the lexicographic solver must meet the rows all the same.
 #[test]
 fn degenerate_vertices_with_nearly_dependent_rows() {
     let (mut solved, mut relaxed) = (0, 0);
@@ -380,16 +388,16 @@ fn degenerate_vertices_with_nearly_dependent_rows() {
         match Lexicographic::new(n, m).solve(&problem.view(), &mut out) {
             Outcome::Solved => solved += 1,
             Outcome::Relaxed { residual } => {
-                assert!(residual < 1e-11, "{seed}: {residual:e}");
+                assert!(residual < DROPPED_ROW, "{seed}: {residual:e}");
                 relaxed += 1;
             }
             Outcome::Failed(status) => panic!("{seed}: {status:?}"),
         }
         let residuals = kkt_residuals(&problem.view(), &out);
         assert_eq!(residuals.bound, 0.0, "{seed}");
-        assert!(residuals.equality < 1e-11, "{seed}: {residuals:?}");
+        assert!(residuals.equality < DROPPED_ROW, "{seed}: {residuals:?}");
     }
-    println!("degenerate and nearly dependent: {solved} solved, {relaxed} relaxed by less than 1e-11");
+    println!("degenerate and nearly dependent: {solved} solved, {relaxed} relaxed by less than 2e-9");
     assert!(solved >= 900);
 }
 

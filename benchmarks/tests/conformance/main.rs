@@ -20,7 +20,11 @@ static NEWCOMER: Entry = entry::<newcomer::JacobianTranspose>();
 
 /// Registered methods and the newcomer, with default parameters.
 fn contestants() -> Vec<Contestant> {
-    METHODS.iter().chain([&NEWCOMER]).map(|e| e.build(&Table::new()).unwrap()).collect()
+    METHODS
+        .iter()
+        .chain([&NEWCOMER])
+        .map(|e| e.build(&Table::new()).unwrap())
+        .collect()
 }
 
 fn driver(contestant: &Contestant, fixture: &Fixture) -> Option<Driver> {
@@ -70,11 +74,28 @@ fn memory_only_accelerates() {
         let majors = old.majors();
         let said = step(&mut old, fixture, &samples, &q, &v, majors);
         let mut fresh = driver(contestant, fixture).unwrap();
-        assert_eq!(said, step(&mut fresh, fixture, &samples, &q, &v, majors), "{}", contestant.id);
-        assert_eq!(old.solution().q, fresh.solution().q, "{} on {}", contestant.id, fixture.name);
+        assert_eq!(
+            said,
+            step(&mut fresh, fixture, &samples, &q, &v, majors),
+            "{}",
+            contestant.id
+        );
+        assert_eq!(
+            old.solution().q,
+            fresh.solution().q,
+            "{} on {}",
+            contestant.id,
+            fixture.name
+        );
         old.reset();
         step(&mut old, fixture, &samples, &q, &v, majors);
-        assert_eq!(old.solution().q, fresh.solution().q, "{} on {}", contestant.id, fixture.name);
+        assert_eq!(
+            old.solution().q,
+            fresh.solution().q,
+            "{} on {}",
+            contestant.id,
+            fixture.name
+        );
     });
 }
 
@@ -84,7 +105,12 @@ fn at_the_solution_a_method_stays() {
         let x = target_at(&fixture.problem, &fixture.start);
         let (q, said) = drive(&mut driver, fixture, &x, 1);
         let moved = difference(fixture.problem.robot(), &fixture.start, &q);
-        assert!(moved.iter().all(|d| d.abs() < 1e-8), "{} on {}: {moved:?}", contestant.id, fixture.name);
+        assert!(
+            moved.iter().all(|d| d.abs() < 1e-8),
+            "{} on {}: {moved:?}",
+            contestant.id,
+            fixture.name
+        );
         assert!(
             said[0].1.majors <= 2 || driver.honours().counts == Trust::Declared,
             "{} on {}: {:?}",
@@ -108,16 +134,27 @@ fn repeated_steps_reach_a_reachable_target() {
         let reached = target_at(&fixture.problem, &q);
         let tasks = fixture.problem.tasks().iter().zip(fixture.problem.slots());
         for (task, slot) in tasks.filter(|(t, _)| t.track != Track::Posture) {
-            let len = task.track.target_len(fixture.problem.robot(), fixture.problem.orientation());
+            let len = task
+                .track
+                .target_len(fixture.problem.robot(), fixture.problem.orientation());
             let range = slot.x..slot.x + len;
             let worst = |sign: f64| {
                 let pairs = reached[range.clone()].iter().zip(&fixture.goal[range.clone()]);
                 pairs.map(|(a, b)| (a - sign * b).abs()).fold(0.0, f64::max)
             };
             // A quaternion and its negative are the same attitude.
-            let error = if len > 3 { worst(1.0).min(worst(-1.0)) } else { worst(1.0) };
+            let error = if len > 3 {
+                worst(1.0).min(worst(-1.0))
+            } else {
+                worst(1.0)
+            };
             let told = said.last().unwrap();
-            assert!(error < tolerance, "{} on {}: {error:e} {told:?}", contestant.id, fixture.name);
+            assert!(
+                error < tolerance,
+                "{} on {}: {error:e} {told:?}",
+                contestant.id,
+                fixture.name
+            );
         }
     });
 }
@@ -130,7 +167,13 @@ fn a_budget_of_zero_returns_the_start() {
         let (termination, counts) = step(&mut driver, fixture, &samples, &fixture.start, &v, 0);
         assert_eq!(termination, Termination::Budget, "{}", contestant.id);
         assert_eq!(counts.majors, 0);
-        assert_eq!(driver.solution().q, fixture.start, "{} on {}", contestant.id, fixture.name);
+        assert_eq!(
+            driver.solution().q,
+            fixture.start,
+            "{} on {}",
+            contestant.id,
+            fixture.name
+        );
     });
 }
 
@@ -141,9 +184,17 @@ fn majors_stay_in_the_budget_and_no_iteration_is_hidden() {
         let metered = driver.honours().counts == Trust::Metered;
         let (_, said) = drive(&mut driver, fixture, &fixture.goal, 50);
         for (_, counts) in said {
-            assert!(counts.majors >= 1 && counts.majors <= budget, "{}: {counts:?}", contestant.id);
+            assert!(
+                counts.majors >= 1 && counts.majors <= budget,
+                "{}: {counts:?}",
+                contestant.id
+            );
             // At most nine trial points of a line search per major, one point before and one after.
-            assert!(!metered || counts.passes <= 9 * counts.majors + 3, "{}: {counts:?}", contestant.id);
+            assert!(
+                !metered || counts.passes <= 9 * counts.majors + 3,
+                "{}: {counts:?}",
+                contestant.id
+            );
         }
     });
 }
@@ -184,7 +235,12 @@ fn intervals_hold_where_they_are_promised() {
                 driver.increment_into(&q, &mut dq);
                 let (lo, hi) = driver.bounds();
                 for ((d, lo), hi) in dq.iter().zip(lo).zip(hi) {
-                    assert!(*d >= lo - 1e-14 && *d <= hi + 1e-14, "{} on {}", contestant.id, fixture.name);
+                    assert!(
+                        *d >= lo - 1e-14 && *d <= hi + 1e-14,
+                        "{} on {}",
+                        contestant.id,
+                        fixture.name
+                    );
                 }
                 q.copy_from_slice(&driver.solution().q);
             }
@@ -200,11 +256,27 @@ fn what_cannot_be_reached_is_neither_hidden_nor_a_hang() {
         let mut x = fixture.goal.clone();
         x[0] += 5.0;
         let (q, said) = drive(&mut driver, fixture, &x, 200);
-        assert!(q.iter().all(|q| q.is_finite()), "{} on {}", contestant.id, fixture.name);
-        let hard_first = fixture.problem.layout(PhaseId(0)).hard.groups().iter().any(|g| g.task == 0);
+        assert!(
+            q.iter().all(|q| q.is_finite()),
+            "{} on {}",
+            contestant.id,
+            fixture.name
+        );
+        let hard_first = fixture
+            .problem
+            .layout(PhaseId(0))
+            .hard
+            .groups()
+            .iter()
+            .any(|g| g.task == 0);
         let (last, _) = said.last().unwrap();
         if hard_first {
-            assert_ne!(*last, Termination::Converged, "{} claims to have reached it", contestant.id);
+            assert_ne!(
+                *last,
+                Termination::Converged,
+                "{} claims to have reached it",
+                contestant.id
+            );
             let promised = driver.honours().boundary && contestant.id.starts_with("ik");
             let relaxed = matches!(last, Termination::HardRowsRelaxed { .. });
             assert!(!promised || relaxed, "{} says {last:?}", contestant.id);
@@ -216,7 +288,11 @@ fn what_cannot_be_reached_is_neither_hidden_nor_a_hang() {
 fn claimed_multipliers_satisfy_the_conditions_the_referee_computes() {
     let mut judged = 0;
     each(|contestant, fixture, mut driver| {
-        let spec = JudgeSpec { com_tolerance_m: 0.08, exit_joints: vec![], torque_supports: vec![] };
+        let spec = JudgeSpec {
+            com_tolerance_m: 0.08,
+            exit_joints: vec![],
+            torque_supports: vec![],
+        };
         let referee = Referee::new(&fixture.problem, spec).unwrap();
         let mut x = fixture.goal.clone();
         x[0] += 0.2;
@@ -238,7 +314,10 @@ fn claimed_multipliers_satisfy_the_conditions_the_referee_computes() {
                     active_tolerance: 1e-9,
                 };
                 let found = referee.own_stationarity(&solution.claim, &certified).unwrap();
-                let label = format!("{} on {} ({termination:?}): {found:?}", contestant.id, fixture.name);
+                let label = format!(
+                    "{} on {} ({termination:?}): {found:?}",
+                    contestant.id, fixture.name
+                );
                 assert!(found.residual < 2e-7 && found.sign_violation < 1e-7, "{label}");
                 judged += 1;
             }
@@ -303,6 +382,12 @@ fn the_amount_of_work_is_known() {
             (contestant.id, said.iter().map(|(_, c)| c.majors).sum())
         })
         .collect();
-    let expected = [("ik1", 100), ("ik2", 152), ("ik3", 100), ("ik4", 261), ("ik5", 276)];
+    let expected = [
+        ("ik1", 100),
+        ("ik2", 152),
+        ("ik3", 100),
+        ("ik4", 261),
+        ("ik5", 276),
+    ];
     assert_eq!(work, expected.map(|(id, n)| (id.to_owned(), n)));
 }

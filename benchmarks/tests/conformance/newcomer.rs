@@ -41,7 +41,10 @@ pub(crate) struct JacobianTransposeParameters {
 
 impl Default for JacobianTransposeParameters {
     fn default() -> Self {
-        Self { n: 15, step_tolerance: 1e-9 }
+        Self {
+            n: 15,
+            step_tolerance: 1e-9,
+        }
     }
 }
 
@@ -51,13 +54,19 @@ impl Parameters for JacobianTransposeParameters {
             key: "n",
             unit: "-",
             meaning: "most major iterations per control step",
-            allowed: Allowed::Whole { least: 1, largest: 10_000 },
+            allowed: Allowed::Whole {
+                least: 1,
+                largest: 10_000,
+            },
         },
         Field {
             key: "step_tolerance",
             unit: "rad, m",
             meaning: "a step whose largest component is below this ends the iteration",
-            allowed: Allowed::Number { least: 1e-15, largest: 1.0 },
+            allowed: Allowed::Number {
+                least: 1e-15,
+                largest: 1.0,
+            },
         },
     ];
 }
@@ -81,7 +90,11 @@ impl Method for JacobianTranspose {
 impl Formulation for JacobianTranspose {
     fn prepare(&self, problem: &Arc<Problem>) -> Result<Prepared, Declined> {
         let (nq, nv) = (problem.robot().nq(), problem.robot().nv());
-        let rows = problem.largest_hard_rows().max(problem.largest_soft_rows()).next_multiple_of(4).max(4);
+        let rows = problem
+            .largest_hard_rows()
+            .max(problem.largest_soft_rows())
+            .next_multiple_of(4)
+            .max(4);
         let stepper = JacobianTransposeStepper {
             problem: Arc::clone(problem),
             step_tolerance: self.0.step_tolerance,
@@ -98,7 +111,12 @@ impl Formulation for JacobianTranspose {
             allocation_free: true,
             counts: Trust::Metered,
         };
-        Ok(Prepared { stepper: Box::new(stepper), majors: self.0.n, honours, notes: vec![] })
+        Ok(Prepared {
+            stepper: Box::new(stepper),
+            majors: self.0.n,
+            honours,
+            notes: vec![],
+        })
     }
 }
 
@@ -149,7 +167,10 @@ impl Stepper for JacobianTransposeStepper {
             }
         }
         out.q.copy_from_slice(&self.q);
-        out.v.iter_mut().zip(&self.dq).for_each(|(v, d)| *v = d / step.dt_s);
+        out.v
+            .iter_mut()
+            .zip(&self.dq)
+            .for_each(|(v, d)| *v = d / step.dt_s);
         ended
     }
 

@@ -42,20 +42,37 @@ impl Fixture {
         let named = tasks.iter().enumerate();
         let parts = ProblemParts {
             robot: Arc::clone(robot),
-            tasks: named.map(|(i, (track, _))| Task { name: format!("task{i}"), track: *track }).collect(),
+            tasks: named
+                .map(|(i, (track, _))| Task {
+                    name: format!("task{i}"),
+                    track: *track,
+                })
+                .collect(),
             phases: vec![Phase {
                 name: "all".into(),
-                tasks: tasks.iter().enumerate().map(|(i, (_, priority))| (i, priority.clone())).collect(),
+                tasks: tasks
+                    .iter()
+                    .enumerate()
+                    .map(|(i, (_, priority))| (i, priority.clone()))
+                    .collect(),
             }],
             boundary,
             objectives: vec![],
             kind: Kind::Tracking,
-            supplies: Supplies { rates: true, preview_s: 0.0 },
+            supplies: Supplies {
+                rates: true,
+                preview_s: 0.0,
+            },
             orientation,
         };
         let problem = Arc::new(Problem::new(parts).unwrap());
         let goal = target_at(&problem, goal);
-        Self { name: name.to_owned(), problem, start, goal }
+        Self {
+            name: name.to_owned(),
+            problem,
+            start,
+            goal,
+        }
     }
 
     /// Two equal samples: the goal `x`, at rest.
@@ -76,10 +93,13 @@ pub(crate) fn target_at(problem: &Problem, q: &[f64]) -> Vec<f64> {
     forward(robot, q, &mut page);
     let mut x = Vec::new();
     let turn = |f: FrameId| match problem.orientation() {
-        OrientationCoordinates::Log => so3::quaternion(&page.frame_rotation(robot, f)).coords.as_slice().to_vec(),
-        OrientationCoordinates::RollPitchYaw => {
-            rpy::from_matrix(&page.frame_rotation(robot, f)).as_slice().to_vec()
-        }
+        OrientationCoordinates::Log => so3::quaternion(&page.frame_rotation(robot, f))
+            .coords
+            .as_slice()
+            .to_vec(),
+        OrientationCoordinates::RollPitchYaw => rpy::from_matrix(&page.frame_rotation(robot, f))
+            .as_slice()
+            .to_vec(),
     };
     for task in problem.tasks() {
         match task.track {
@@ -99,8 +119,16 @@ pub(crate) fn target_at(problem: &Problem, q: &[f64]) -> Vec<f64> {
 /// The configuration between the limits at the given fraction of the range (unlimited joints within ±1).
 fn between_limits(robot: &Robot, fraction: impl Fn(usize) -> f64) -> Vec<f64> {
     let mut q = robot.neutral();
-    for (j, (q, c)) in q[robot.root().nq()..].iter_mut().zip(robot.coordinates()).enumerate() {
-        let (lo, hi) = if c.limits.lower.is_finite() { (c.limits.lower, c.limits.upper) } else { (-1.0, 1.0) };
+    for (j, (q, c)) in q[robot.root().nq()..]
+        .iter_mut()
+        .zip(robot.coordinates())
+        .enumerate()
+    {
+        let (lo, hi) = if c.limits.lower.is_finite() {
+            (c.limits.lower, c.limits.upper)
+        } else {
+            (-1.0, 1.0)
+        };
         *q = lo + (hi - lo) * fraction(j);
     }
     q
@@ -143,15 +171,31 @@ fn arm(id: &str, tasks: impl Fn(FrameId) -> Vec<(Track, Priority)>, boundary: Bo
     let robot = Arc::new(embedded(id).unwrap());
     let start = between_limits(&robot, |j| 0.45 + 0.02 * (j % 3) as f64);
     let goal = between_limits(&robot, |j| 0.55 - 0.03 * (j % 2) as f64);
-    Fixture::new(id, &robot, tasks(Fixture::last_frame(&robot)), boundary, start, &goal)
+    Fixture::new(
+        id,
+        &robot,
+        tasks(Fixture::last_frame(&robot)),
+        boundary,
+        start,
+        &goal,
+    )
 }
 
 /// Every fixture of the small set.
 pub(crate) fn all() -> Vec<Fixture> {
     let soft_pose = |f| vec![(Track::Pose(f), compromised())];
-    let hard_position = |f| vec![(Track::Position(f), Priority::Hard), (Track::Posture, compromised())];
+    let hard_position = |f| {
+        vec![
+            (Track::Position(f), Priority::Hard),
+            (Track::Posture, compromised()),
+        ]
+    };
     vec![
-        arm("pendulum", |f| vec![(Track::Position(f), compromised())], Boundary::Box),
+        arm(
+            "pendulum",
+            |f| vec![(Track::Position(f), compromised())],
+            Boundary::Box,
+        ),
         arm("arm6", soft_pose, Boundary::Box),
         arm("arm7", soft_pose, Boundary::Ellipse { margin: 0.0 }),
         arm("arm7", hard_position, Boundary::Box),

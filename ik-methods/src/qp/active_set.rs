@@ -13,7 +13,7 @@
 //! Nothing is allocated after construction for problems up to the given size.
 
 use super::dual::Dual;
-use super::elimination::{DEPENDENT, Elimination, NEARLY_DEPENDENT, MAX_UNKNOWNS, Rows};
+use super::elimination::{DEPENDENT, Elimination, MAX_UNKNOWNS, NEARLY_DEPENDENT, Rows};
 use super::kernels::{max_abs, max_abs_or_nan};
 use super::reduced::Reduced;
 use super::{Qp, QpSolution, QpSolver, QpStatus};
