@@ -332,9 +332,9 @@ fn ik_like_problems_with_dependent_rows() {
     });
 }
 
-/// Rows of scale 1 whose remainder is below 1e-7 count as dependent: unknowns that move by some 0.02 then miss them by at
-/// most 2e-9.
-const DROPPED_ROW: f64 = 2e-9;
+/// Rows whose remainder is below 1e-7 of their 1-norm (here at most 3) count as dependent: unknowns that move by at most
+/// 0.035 then miss them by at most this.
+const DROPPED_ROW: f64 = 1e-8;
 
 /// With a singular value of 1e-9 the box decides within rounding of the rows whether there is a solution.
 /// The lexicographic solver must come back with rows met but for the remainder that it leaves out, whatever the
@@ -397,7 +397,7 @@ fn degenerate_vertices_with_nearly_dependent_rows() {
         assert_eq!(residuals.bound, 0.0, "{seed}");
         assert!(residuals.equality < DROPPED_ROW, "{seed}: {residuals:?}");
     }
-    println!("degenerate and nearly dependent: {solved} solved, {relaxed} relaxed by less than 2e-9");
+    println!("degenerate and nearly dependent: {solved} solved, {relaxed} relaxed by less than 1e-8");
     assert!(solved >= 900);
 }
 
