@@ -116,8 +116,8 @@ pub struct Quality {
     pub singularity_exit_s: Option<f64>,
     /// Mean over t ≥ 1 s of the sum of squared static joint torques (N²m²), where asked for.
     pub torque_squared_mean_n2m2: Option<f64>,
-    /// All finite, limit violation ≤ 1e-6 rad, boundary value ≤ 1e-4, hard errors < 1e-3, centre-of-mass error below the
-    /// tolerance of the suite.
+    /// All finite, limit violation ≤ 1e-6 rad, boundary value ≤ 1e-4 (of a polygon: excess ≤ 1e-6 rad instead), hard errors
+    /// < 1e-3, centre-of-mass error below the tolerance of the suite.
     pub survived: bool,
 }
 
@@ -155,8 +155,8 @@ pub struct Effort {
 /// A table of a run over time, one row per sample k = 0, 1, …
 ///
 /// Columns: `t`; `base_x base_y base_z base_qx base_qy base_qz base_qw` if the root floats; one per joint by its name; then
-/// per task `<task>_target_<component>` (x y z, roll pitch yaw, or qx qy qz qw), `<task>_error_m` and/or
-/// `<task>_error_rad` (norm, angle), `<task>_rate_error_m_s` for the centre of mass; `step_us`, `majors`, `minors` (0 at
+/// per task `<task>_target_<component>` (x y z, roll pitch yaw, or qx qy qz qw), the actual point `<task>_x _y _z` (m) of
+/// tasks that track one, `<task>_error_m` and/or `<task>_error_rad` (norm, angle), `<task>_rate_error_m_s` for the centre of mass; `step_us`, `majors`, `minors` (0 at
 /// k = 0); where the suite asks for torques `torque_<joint>` (Nm).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {

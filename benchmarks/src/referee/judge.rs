@@ -45,9 +45,14 @@ pub(super) fn judge(referee: &Referee, run: &Run<'_>) -> Quality {
     quality
 }
 
-fn survives(quality: &Quality, com_tolerance_m: f64) -> bool {
-    quality.position_limit_violation_max_rad <= LIMIT_TOLERANCE
-        && quality.boundary_value_max.is_none_or(|g| g <= BOUNDARY_TOLERANCE)
+pub(super) fn survives(quality: &Quality, com_tolerance_m: f64) -> bool {
+    // A polygon reaches outside the ellipse of eq. (6): who was given one is held to it.
+    let inside = match quality.polygon_excess_max_rad {
+        Some(excess) => excess <= LIMIT_TOLERANCE,
+        None => quality.boundary_value_max.is_none_or(|g| g <= BOUNDARY_TOLERANCE),
+    };
+    inside
+        && quality.position_limit_violation_max_rad <= LIMIT_TOLERANCE
         && quality.hard_error_max_m < HARD_TOLERANCE
         && quality.hard_error_max_rad < HARD_TOLERANCE
         && quality

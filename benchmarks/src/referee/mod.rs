@@ -159,7 +159,7 @@ impl Referee {
     /// Choices beyond the documentation of [`Quality`]: tasks count in the phases they belong to, k = 0 in
     /// that of k = 1. A compromised pose has two entries in `soft_error_rms`, `<task>_m` and `<task>_rad`. A
     /// posture task is measured in rad. Singular values are those of every sample. A polygon reaches past the
-    /// ellipse, so a run that uses all of it does not survive eq. (6).
+    /// ellipse: a run that was given one is held to it, and its value of eq. (6) is reported only.
     pub fn judge(&self, run: &Run<'_>) -> Quality {
         judge::judge(self, run)
     }

@@ -32,6 +32,16 @@ pub(super) fn tracked_frames(track: Track) -> (Option<FrameId>, Option<FrameId>)
     }
 }
 
+/// Where the point that a task tracks is (m, world), if it tracks one.
+pub(super) fn tracked_point(problem: &Problem, posture: &Posture, task: usize) -> Option<Vector3<f64>> {
+    match problem.tasks()[task].track {
+        Track::CentreOfMass => Some(posture.com),
+        track => tracked_frames(track)
+            .0
+            .map(|f| posture.frame(problem.robot(), f).translation.vector),
+    }
+}
+
 /// The part of x that belongs to a task.
 pub(super) fn target_of<'a>(problem: &Problem, task: usize, x: &'a [f64]) -> &'a [f64] {
     let start = problem.slots()[task].x;

@@ -1,7 +1,7 @@
 //! The run as a table over time; columns are documented at [`Trace`].
 
 use super::judge::com_rate_error;
-use super::tasks::{target_of, task_error, tracked_frames};
+use super::tasks::{target_of, task_error, tracked_frames, tracked_point};
 use super::torque::static_torques;
 use super::{Readable, Referee, Run};
 use crate::records::Trace;
@@ -57,6 +57,7 @@ fn task_columns(problem: &Problem, task: usize, columns: &mut Vec<String>) {
     );
     let (position, orientation) = tracked_frames(track);
     if position.is_some() || track == Track::CentreOfMass {
+        columns.extend(["x", "y", "z"].map(|c| format!("{name}_{c}")));
         columns.push(format!("{name}_error_m"));
     }
     if orientation.is_some() || track == Track::Posture {
@@ -131,6 +132,9 @@ fn task_values(
 ) {
     let (sample, posture) = (&readable.samples[k], &readable.postures[k]);
     row.extend(target_of(problem, task, sample.x));
+    if let Some(point) = tracked_point(problem, posture, task) {
+        row.extend(point.iter());
+    }
     let error = task_error(problem, posture, sample.q, task, sample.x);
     row.extend([error.m, error.rad].into_iter().flatten().map(|miss| miss.norm));
     if problem.tasks()[task].track == Track::CentreOfMass {

@@ -255,6 +255,21 @@ fn limits_and_boundaries() {
     );
 }
 
+/// A polygon reaches outside the ellipse: a run inside it survives with a positive value of eq. (6), one outside does not.
+#[test]
+fn a_run_survives_the_boundary_it_was_given() {
+    let survives = |polygon_excess_max_rad, g| {
+        let quality = Quality {
+            polygon_excess_max_rad,
+            boundary_value_max: Some(g),
+            ..Quality::default()
+        };
+        super::super::judge::survives(&quality, 0.08)
+    };
+    assert!(survives(Some(0.0), 0.3) && !survives(Some(1e-3), -0.3));
+    assert!(!survives(None, 0.3) && survives(None, -0.3));
+}
+
 #[test]
 fn a_joint_without_limits_has_no_boundary_value() {
     let problem = problem(

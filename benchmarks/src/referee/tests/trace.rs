@@ -35,8 +35,8 @@ fn columns_and_rows_of_the_shoot_out() {
     ];
     assert_eq!(trace.columns[..8], fixed);
     assert_eq!(trace.columns[8], "LHipSag");
-    // Time, root, joints, com (3 + 2), two soles (6 + 2), torso (3 + 1), three efforts, torques.
-    assert_eq!(trace.columns.len(), 1 + 7 + 12 + 5 + 2 * 8 + 4 + 3 + 12);
+    // Time, root, joints, com (3 + 3 + 2), two soles (6 + 3 + 2), torso (3 + 1), three efforts, torques.
+    assert_eq!(trace.columns.len(), 1 + 7 + 12 + 8 + 2 * 11 + 4 + 3 + 12);
     assert!(trace.rows.iter().all(|row| row.len() == trace.columns.len()));
     let column = |name: &str| trace.column(name).unwrap_or_else(|| panic!("no column {name}"));
     assert_eq!(column("t"), [0.0, 0.005, 0.01]);
@@ -95,6 +95,9 @@ fn rows_stop_where_the_run_cannot_be_read() {
         "com_target_x",
         "com_target_y",
         "com_target_z",
+        "com_x",
+        "com_y",
+        "com_z",
         "com_error_m",
         "com_rate_error_m_s",
         "step_us",
@@ -134,5 +137,9 @@ fn quaternion_and_posture_targets_have_columns() {
         (1.0, 0.25)
     );
     assert_eq!((value("tool_error_m"), value("tool_error_rad")), (0.0, 0.0));
+    assert_eq!(
+        (value("tool_x"), value("tool_y"), value("tool_z")),
+        (2.0, 0.0, 0.0)
+    );
     assert!((value("rest_error_rad") - 0.5_f64.hypot(0.25)).abs() < 1e-16);
 }
