@@ -5,8 +5,9 @@
 //! ```
 //!
 //! Source: Gould, Hribar & Nocedal (2001), On the solution of equality constrained quadratic programming problems arising
-//! in optimization, SIAM J. Sci. Comput. 23(4), alg. 6.2, with the normal-equations projection and one step of iterative
-//! refinement (their §7). The reduced operator is R·I plus a matrix of the rank of J_s, so at most rank + 1 iterations are
+//! in optimization, SIAM J. Sci. Comput. 23(4), alg. 6.2, with the normal-equations projection, one step of iterative
+//! refinement and the residual replaced by its projection (their §7): the part of the residual in the range of J_hᵀ does
+//! not vanish, and its rounding would otherwise drown the rest. The reduced operator is R·I plus a matrix of the rank of J_s, so at most rank + 1 iterations are
 //! needed in exact arithmetic.
 
 use ik_core::evaluator::Linearisation;
@@ -95,7 +96,7 @@ impl ProjectedCg {
         iterations
     }
 
-    /// `projected = P residual`, P the orthogonal projector onto the null space of J_h; refined once.
+    /// `residual = projected = P residual`, P the orthogonal projector onto the null space of J_h; refined once.
     fn project(&mut self, lin: &Linearisation) {
         self.projected.copy_from_slice(&self.residual);
         let m = lin.hard.rows();
@@ -104,6 +105,7 @@ impl ProjectedCg {
             solve_gram(&self.gram, m, &mut self.rows);
             lin.hard.add_transposed(&self.rows, -1.0, &mut self.projected);
         }
+        self.residual.copy_from_slice(&self.projected);
     }
 }
 

@@ -75,7 +75,7 @@ pub enum Allowed {
 impl Display for Allowed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Number { least, largest } => write!(f, "a number from {least} to {largest}"),
+            Self::Number { least, largest } => write!(f, "a number from {least:?} to {largest:?}"),
             Self::Whole { least, largest } => write!(f, "a whole number from {least} to {largest}"),
             Self::Words(words) => {
                 let quoted: Vec<_> = words.iter().map(|w| format!("\"{w}\"")).collect();

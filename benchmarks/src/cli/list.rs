@@ -23,9 +23,7 @@ fn method(entry: &Entry, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "    {}", info.source)?;
     let defaults = entry.defaults();
     for field in entry.fields() {
-        let default = defaults
-            .get(field.key)
-            .map_or_else(String::new, ToString::to_string);
+        let default = defaults.get(field.key).map_or_else(String::new, shown);
         writeln!(
             out,
             "    --set {}={default}   [{}] {}; {}",
@@ -33,6 +31,13 @@ fn method(entry: &Entry, out: &mut dyn Write) -> io::Result<()> {
         )?;
     }
     writeln!(out)
+}
+
+/// A parameter's value; small numbers as powers of ten.
+fn shown(value: &toml::Value) -> String {
+    value
+        .as_float()
+        .map_or_else(|| value.to_string(), |number| format!("{number:?}"))
 }
 
 fn suites(out: &mut dyn Write) -> io::Result<()> {

@@ -248,3 +248,111 @@ fn prepare<O: Optimiser>(
         notes: vec!["hard rows and limits are penalties: both are violated a little".into()],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ik_core::boundary::Boundary;
+    use ik_core::problem::{Kind, Phase, PhaseId, ProblemParts, Supplies};
+    use ik_core::robot::embedded;
+    use ik_core::step::{Bounds, Window};
+    use ik_core::task::{OrientationCoordinates, Priority, Task, Track, Weights};
+
+    #[test]
+    fn the_gradient_is_that_of_the_cost() {
+        let robot = Arc::new(embedded("coman-legs").unwrap());
+        let tasks = [
+            (
+                "com",
+                Track::CentreOfMass,
+                Priority::Compromised(Weights::Uniform(2.0)),
+            ),
+            (
+                "left",
+                Track::Pose(robot.frame("l_sole").unwrap()),
+                Priority::Hard,
+            ),
+        ];
+        let problem = Arc::new(
+            Problem::new(ProblemParts {
+                robot: Arc::clone(&robot),
+                tasks: tasks
+                    .iter()
+                    .map(|(n, t, _)| Task {
+                        name: (*n).into(),
+                        track: *t,
+                    })
+                    .collect(),
+                phases: vec![Phase {
+                    name: "all".into(),
+                    tasks: tasks
+                        .iter()
+                        .enumerate()
+                        .map(|(i, (_, _, p))| (i, p.clone()))
+                        .collect(),
+                }],
+                boundary: Boundary::None,
+                objectives: vec![],
+                kind: Kind::Tracking,
+                supplies: Supplies {
+                    rates: true,
+                    preview_s: 0.0,
+                },
+                orientation: OrientationCoordinates::Log,
+            })
+            .unwrap(),
+        );
+        // Turned, bent, and with two joints outside narrow intervals.
+        let d: Vec<f64> = (0..18).map(|i| 0.4 * f64::from(i * i % 7) - 0.9).collect();
+        let (lo, hi) = ([-0.5; 18], [1.0; 18]);
+        let one: Vec<f64> = (0..10 + 9)
+            .map(|i| if i == 9 { 1.0 } else { 0.05 * f64::from(i % 4) })
+            .collect();
+        let data = [one.clone(), one].concat();
+        let (q_prev, zeros) = (robot.neutral(), [0.0; 18]);
+        let step = ControlStep {
+            q_prev: &q_prev,
+            v_prev: &zeros,
+            dt_s: 0.01,
+            phase: PhaseId(0),
+            targets: Window::new(&data, problem.nx(), problem.nxdot()).unwrap(),
+            bounds: Bounds {
+                lo: &lo,
+                hi: &hi,
+                outside: 0,
+            },
+            gains: &[],
+        };
+        let mut eval = Evaluator::new(&problem);
+        let mut scratch = Scratch {
+            lin: Linearisation::new(&problem),
+            q: vec![0.0; robot.nq()],
+            best: vec![0.0; 18],
+        };
+        let state = State {
+            eval: &mut eval,
+            scratch: &mut scratch,
+            best_cost: f64::INFINITY,
+        };
+        let penalised = Penalised {
+            problem: &problem,
+            step: &step,
+            penalty: 3.0,
+            state: RefCell::new(state),
+        };
+        let (_, gradient) = penalised.evaluate(&d);
+        for v in 0..18 {
+            let at = |h: f64| {
+                let mut moved = d.clone();
+                moved[v] += h;
+                penalised.evaluate(&moved).0
+            };
+            let numeric = (at(1e-6) - at(-1e-6)) / 2e-6;
+            assert!(
+                (gradient[v] - numeric).abs() < 1e-7 * (1.0 + numeric.abs()),
+                "{v}: {} {numeric}",
+                gradient[v]
+            );
+        }
+    }
+}
