@@ -303,7 +303,7 @@ mod tests {
             .unwrap(),
         );
         // Turned, bent, and with two joints outside narrow intervals.
-        let d: Vec<f64> = (0..18).map(|i| 0.4 * f64::from(i * i % 7) - 0.9).collect();
+        let d: Vec<f64> = (0..18).map(|i| 0.4 * f64::from(i * i % 7) - 0.93).collect();
         let (lo, hi) = ([-0.5; 18], [1.0; 18]);
         let one: Vec<f64> = (0..10 + 9)
             .map(|i| if i == 9 { 1.0 } else { 0.05 * f64::from(i % 4) })
