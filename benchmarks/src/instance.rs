@@ -225,7 +225,9 @@ impl Instance {
             file: source.to_owned(),
             reason: e.to_string(),
         })?;
-        let own = contestant.id == self.method && recorded(&contestant.parameters) == self.parameters;
+        // The instance may leave parameters at their defaults: it is compared with them filled in.
+        let recorded_own = self.contestant(None, &toml::Table::new(), source)?;
+        let own = contestant.id == self.method && contestant.parameters == recorded_own.parameters;
         let majors = if own { self.majors } else { driver.majors() };
         let (termination, counts) = driver.step(&input, majors);
         let solution = driver.solution();

@@ -145,6 +145,9 @@ impl Boundary {
 }
 
 /// Where q⁻ admits no increment: move to the nearest admissible position, at most `reach` per step (notes §2).
+///
+/// No increment satisfies eq. (6) there, this one included: on the way back g is up to 1 (and more while still outside),
+/// so such a run reports a positive boundary value although it follows the rule.
 fn recover(q_prev: f64, nearest: f64, reach: f64) -> Interval {
     let dq = (nearest - q_prev).clamp(-reach, reach);
     Interval {
@@ -172,7 +175,13 @@ fn position_interval(limits: &Limits, q_prev: f64, reach: f64) -> Interval {
 /// `Δu = (∓ h v s − u⁻ v²) / (h² + v²)`, `s² = h² + v² − u⁻²`.
 fn ellipse_interval(limits: &Limits, margin: f64, q_prev: f64, reach: f64) -> Interval {
     if !(limits.lower.is_finite() && limits.upper.is_finite()) {
-        return position_interval(limits, q_prev, reach);
+        // Eq. (6) has no meaning without a range; what there is of one still keeps its margin.
+        let inner = Limits {
+            lower: limits.lower + margin,
+            upper: limits.upper - margin,
+            ..*limits
+        };
+        return position_interval(&inner, q_prev, reach);
     }
     let middle = 0.5 * (limits.lower + limits.upper);
     let h = 0.5 * (limits.upper - limits.lower) - margin;

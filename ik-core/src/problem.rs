@@ -112,6 +112,9 @@ pub enum ProblemError {
         /// What is allowed.
         allowed: String,
     },
+    /// A pose problem, whose steps have no duration, with a bound on velocities.
+    #[error("a pose problem has no time step: its boundary may be none or positions, found {0:?}")]
+    PoseVelocity(Boundary),
     /// A bad boundary.
     #[error(transparent)]
     Boundary(#[from] BoundaryError),
@@ -144,6 +147,9 @@ impl Problem {
     pub fn new(parts: ProblemParts) -> Result<Self, ProblemError> {
         check_tasks(&parts)?;
         parts.boundary.validate(&parts.robot)?;
+        if parts.kind == Kind::Pose && parts.boundary.bounds_velocity() {
+            return Err(ProblemError::PoseVelocity(parts.boundary));
+        }
         let (mut slots, mut nx, mut nxdot) = (Vec::new(), 0, 0);
         for task in &parts.tasks {
             slots.push(Slot { x: nx, xdot: nxdot });

@@ -25,7 +25,8 @@
 //!
 //! ## Deviations
 //! Deviation: `inner = "cg"` solves each damped system by projected conjugate gradients (Gould, Hribar & Nocedal 2001,
-//! alg. 6.2) instead of elimination: same iterates up to rounding, its iterations are counted as minors.
+//! alg. 6.2) instead of elimination: same iterates up to rounding, its iterations are counted as minors. Where hard rows
+//! are dependent and it cannot meet them, the major is solved by elimination after all.
 
 use crate::error_integration::{DAMPING_FIELD, damped_step};
 use crate::projected_cg::ProjectedCg;
@@ -78,6 +79,9 @@ impl Default for GaussNewtonParameters {
     }
 }
 
+/// Hard rows that conjugate gradients leave by less than this (m, rad) are met: rounding of rows of size 1.
+const MET: f64 = 1e-12;
+
 /// The help of the step tolerance, which the iterating methods share.
 pub(crate) const STEP_TOLERANCE_FIELD: Field = Field {
     key: "step_tolerance",
@@ -129,7 +133,11 @@ impl Formulation for GaussNewton {
             parameters: self.parameters.clone(),
             lin: Linearisation::new(problem),
             qp: StepQp::new(problem),
-            cg: ProjectedCg::new(problem.robot().nv(), problem.largest_hard_rows()),
+            cg: ProjectedCg::new(
+                problem.robot().nv(),
+                problem.largest_hard_rows(),
+                problem.largest_soft_rows(),
+            ),
             q: vec![0.0; problem.robot().nq()],
             rate: vec![
                 0.0;
@@ -208,7 +216,11 @@ impl GaussNewtonStepper {
                 eval.linearise(&self.q, step.phase, step.targets.now(), &mut self.lin);
                 let iterations = self.cg.solve(&self.lin, damping, &mut self.qp.solution.x);
                 eval.meter.minors(iterations);
-                Outcome::Solved
+                if self.cg.violation(&self.lin, &self.qp.solution.x) <= MET {
+                    return Outcome::Solved;
+                }
+                // Dependent or contradicting rows: elimination decides which, and reports it.
+                damped_step(&mut self.qp, &mut self.lin, step, &self.q, damping, eval)
             }
         }
     }

@@ -33,17 +33,26 @@ pub(crate) struct ProjectedCg {
 }
 
 impl ProjectedCg {
-    pub(crate) fn new(n: usize, m: usize) -> Self {
+    pub(crate) fn new(n: usize, m: usize, soft_rows: usize) -> Self {
         let m = m.next_multiple_of(4).max(4);
         Self {
             gram: vec![0.0; m * m],
             rows: vec![0.0; m],
-            soft: vec![0.0; n.next_multiple_of(4).max(64)],
+            soft: vec![0.0; soft_rows.next_multiple_of(4).max(4)],
             residual: vec![0.0; n],
             projected: vec![0.0; n],
             direction: vec![0.0; n],
             image: vec![0.0; n],
         }
+    }
+
+    /// Largest violation that `d` leaves in the hard rows (m, rad): not rounding where these are dependent, since dependent
+    /// rows are left out.
+    pub(crate) fn violation(&mut self, lin: &Linearisation, d: &[f64]) -> f64 {
+        lin.hard.multiply_into(d, &mut self.rows);
+        let rows = self.rows.iter().zip(&lin.hard.error[..lin.hard.rows()]);
+        rows.map(|(moved, error)| (moved + error).abs())
+            .fold(0.0, f64::max)
     }
 
     /// Solves at the linearised configuration into `d`; returns the number of iterations.

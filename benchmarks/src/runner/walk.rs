@@ -68,6 +68,9 @@ impl Timed {
 }
 
 /// Replays a run for its step times and compares the answers of the first repeat.
+/// Replays that every run gets: a minimum over one would be no minimum.
+const LEAST_REPLAYS: u32 = 2;
+
 pub(super) fn time(case: &Case, driver: &mut Driver, played: &Played, timing: Timing) -> Timed {
     let steps = case.samples.steps();
     driver.reset();
@@ -78,7 +81,7 @@ pub(super) fn time(case: &Case, driver: &mut Driver, played: &Played, timing: Ti
         differs_at: None,
     };
     let begin = Instant::now();
-    while timed.repeats < timing.repeats && (timed.repeats == 0 || begin.elapsed() < timing.cap) {
+    while timed.repeats < timing.repeats && (timed.repeats < LEAST_REPLAYS || begin.elapsed() < timing.cap) {
         driver.reset();
         let first = timed.repeats == 0;
         walk(case, driver, steps, |step| {
