@@ -71,6 +71,9 @@ fn rows(c: &mut Criterion) {
     group.bench_function("linearise", |b| {
         b.iter(|| evaluator.linearise(black_box(&q), PhaseId(0), target, &mut lin));
     });
+    group.bench_function("soft_velocity_derivative", |b| {
+        b.iter(|| evaluator.soft_velocity_derivative(&mut lin, target, black_box(&dq)));
+    });
     group.bench_function("velocity_derivative", |b| {
         b.iter(|| evaluator.velocity_derivative(&mut lin, target, black_box(&dq)));
     });

@@ -109,40 +109,67 @@ impl Evaluator {
 
     /// One tree pass at `q` and the rows of `phase` against `target`.
     pub fn linearise(&mut self, q: &[f64], phase: PhaseId, target: Sample<'_>, out: &mut Linearisation) {
+        self.residual(q, phase, target, out);
+        self.hard_jacobian(out, target);
+    }
+
+    /// [`Evaluator::linearise`] without the Jacobian of the hard rows, for points that may be discarded;
+    /// [`Evaluator::hard_jacobian`] completes it.
+    pub fn residual(&mut self, q: &[f64], phase: PhaseId, target: Sample<'_>, out: &mut Linearisation) {
         self.pass(q, &mut out.page);
-        let layout = self.problem.layout(phase);
-        let robot = self.problem.robot();
-        layout.hard.fill(robot, q, &out.page, target, &mut out.hard);
-        layout.soft.fill(robot, q, &out.page, target, &mut out.soft);
+        let (layout, robot) = (self.problem.layout(phase), self.problem.robot());
+        let page = &out.page;
+        layout.hard.fill_residual(robot, q, page, target, &mut out.hard);
+        layout.soft.fill_residual(robot, q, page, target, &mut out.soft);
+        layout.soft.fill_jacobian(robot, page, target.x, &mut out.soft);
         out.phase = phase;
     }
 
-    /// Fills `second` of both row stacks with `∂[J(q) (q ⊖ q⁻)]/∂v` at the linearised configuration, `dq = q ⊖ q⁻`: the
+    /// Writes the Jacobian of the hard rows at the configuration of `lin`.
+    pub fn hard_jacobian(&self, lin: &mut Linearisation, target: Sample<'_>) {
+        let rows = &self.problem.layout(lin.phase).hard;
+        rows.fill_jacobian(self.problem.robot(), &lin.page, target.x, &mut lin.hard);
+    }
+
+    /// Fills `second` of both row stacks as [`Evaluator::soft_velocity_derivative`] does.
+    pub fn velocity_derivative(&self, lin: &mut Linearisation, target: Sample<'_>, dq: &[f64]) {
+        self.soft_velocity_derivative(lin, target, dq);
+        self.hard_velocity_derivative(lin, target, dq);
+    }
+
+    /// Fills `second` of the soft rows with `∂[J(q) (q ⊖ q⁻)]/∂v` at the linearised configuration, `dq = q ⊖ q⁻`: the
     /// exact derivative of the velocity rows of Faraji & Ijspeert (2017), eqs. (8) and (9). For orientation rows as
     /// logarithms the target rate's own (first-order in the error) dependence on q is left out.
-    pub fn velocity_derivative(&self, lin: &mut Linearisation, target: Sample<'_>, dq: &[f64]) {
-        self.second(lin, target, dq);
-        lin.hard.add_difference_derivative(self.problem.robot(), dq);
+    pub fn soft_velocity_derivative(&self, lin: &mut Linearisation, target: Sample<'_>, dq: &[f64]) {
+        self.soft_second(lin, target, dq);
         lin.soft.add_difference_derivative(self.problem.robot(), dq);
+    }
+
+    /// The same for the hard rows.
+    pub fn hard_velocity_derivative(&self, lin: &mut Linearisation, target: Sample<'_>, dq: &[f64]) {
+        self.hard_second(lin, target, dq);
+        lin.hard.add_difference_derivative(self.problem.robot(), dq);
     }
 
     /// Fills `second` of both row stacks with the product of each row's Hessian (second derivative of
     /// `error(q ⊕ d)` at d = 0, symmetric) with `u`: entry (i, v) is `Σ_w ∂²error_i/∂v∂w u_w`.
     pub fn hessian_product(&self, lin: &mut Linearisation, target: Sample<'_>, u: &[f64]) {
-        self.second(lin, target, u);
-        lin.hard.symmetrise_root(self.problem.robot(), u);
+        self.soft_second(lin, target, u);
         lin.soft.symmetrise_root(self.problem.robot(), u);
+        self.hard_second(lin, target, u);
+        lin.hard.symmetrise_root(self.problem.robot(), u);
     }
 
-    fn second(&self, lin: &mut Linearisation, target: Sample<'_>, u: &[f64]) {
-        let layout = self.problem.layout(lin.phase);
-        let robot = self.problem.robot();
-        layout
-            .hard
-            .fill_second(robot, &lin.page, &mut lin.second, target.x, u, &mut lin.hard);
-        layout
-            .soft
-            .fill_second(robot, &lin.page, &mut lin.second, target.x, u, &mut lin.soft);
+    fn soft_second(&self, lin: &mut Linearisation, target: Sample<'_>, u: &[f64]) {
+        let rows = &self.problem.layout(lin.phase).soft;
+        let (page, second) = (&lin.page, &mut lin.second);
+        rows.fill_second(self.problem.robot(), page, second, target.x, u, &mut lin.soft);
+    }
+
+    fn hard_second(&self, lin: &mut Linearisation, target: Sample<'_>, u: &[f64]) {
+        let rows = &self.problem.layout(lin.phase).hard;
+        let (page, second) = (&lin.page, &mut lin.second);
+        rows.fill_second(self.problem.robot(), page, second, target.x, u, &mut lin.hard);
     }
 
     /// Adds the gain-weighted gradients of the problem's objectives to `gradient` (length nv); returns the weighted sum

@@ -151,9 +151,42 @@ impl RowSet {
         self.rows += rows;
     }
 
-    /// Writes error, Jacobian and rate of every row at the page's configuration `q`.
-    pub(crate) fn fill(&self, robot: &Robot, q: &[f64], page: &Page, target: Sample<'_>, rows: &mut Rows) {
+    /// Writes error and rate of every row at the page's configuration `q`.
+    pub(crate) fn fill_residual(
+        &self,
+        robot: &Robot,
+        q: &[f64],
+        page: &Page,
+        target: Sample<'_>,
+        rows: &mut Rows,
+    ) {
         rows.set_height(self.rows);
+        for block in &self.blocks {
+            match block {
+                Block::Frame {
+                    body,
+                    p,
+                    r,
+                    position,
+                    orientation,
+                } => {
+                    let pose = &page.bodies[*body];
+                    if let Some(at) = position {
+                        rows.set_difference(*at, &pose.point(p)[..3], target);
+                    }
+                    if let Some(at) = orientation {
+                        self.orientation_residual(&pose.rotation(r), *at, target, rows);
+                    }
+                }
+                Block::CentreOfMass(at) => rows.set_difference(*at, &page.com[..3], target),
+                Block::Posture(at) => rows.set_difference(*at, &q[robot.root().nq()..], target),
+            }
+        }
+        self.weigh(rows, Part::Residual);
+    }
+
+    /// Writes the Jacobian of every row at the page's configuration, `target` being the x of a sample.
+    pub(crate) fn fill_jacobian(&self, robot: &Robot, page: &Page, target: &[f64], rows: &mut Rows) {
         rows.jacobian.fill(0.0);
         for block in &self.blocks {
             match block {
@@ -165,26 +198,21 @@ impl RowSet {
                     orientation,
                 } => {
                     let pose = &page.bodies[*body];
-                    let point = pose.point(p);
-                    if let Some(at) = position {
-                        rows.set_difference(*at, &[point[0], point[1], point[2]], target);
-                    }
+                    let point = (*body, pose.point(p));
                     match orientation {
                         Some(at) => {
-                            let map = self.orientation_rows(&pose.rotation(r), *at, target, rows);
-                            rows.fill_pose(robot, page, (*body, point), *position, (at.row, map));
+                            let map = self.row_map(&pose.rotation(r), *at, target);
+                            rows.fill_pose(robot, page, point, *position, (at.row, map));
                         }
-                        None => rows.fill_position(robot, page, (*body, point), *position),
+                        None => rows.fill_position(robot, page, point, *position),
                     }
                 }
                 Block::CentreOfMass(at) => {
-                    rows.set_difference(*at, &page.com[..3], target);
                     for (v, column) in page.com_jacobian.iter().enumerate() {
                         rows.add3(v, at.row, column);
                     }
                 }
                 Block::Posture(at) => {
-                    rows.set_difference(*at, &q[robot.root().nq()..], target);
                     let first = robot.root().nv();
                     for j in 0..robot.coordinates().len() {
                         let ld = rows.ld;
@@ -193,11 +221,11 @@ impl RowSet {
                 }
             }
         }
-        self.weigh(rows, Part::Linear);
+        self.weigh(rows, Part::Jacobian);
     }
 
-    /// Error and rate of orientation rows; returns the map from angular velocity to row rates.
-    fn orientation_rows(&self, r: &Matrix3<f64>, at: At, target: Sample<'_>, rows: &mut Rows) -> RowMap {
+    /// Error and rate of orientation rows.
+    fn orientation_residual(&self, r: &Matrix3<f64>, at: At, target: Sample<'_>, rows: &mut Rows) {
         match self.coordinates {
             OrientationCoordinates::RollPitchYaw => {
                 let now = rpy::from_matrix(r);
@@ -205,19 +233,14 @@ impl RowSet {
                     rows.error[at.row + k] = wrap(now[k] - target.x[at.x + k]);
                     rows.rate[at.row + k] = target.xdot[at.xdot + k];
                 }
-                RowMap::RollPitchYaw(rpy::RateMap::from_matrix(r))
             }
             OrientationCoordinates::Log => {
-                let t = &target.x[at.x..at.x + 4];
-                let target_rotation = UnitQuaternion::new_normalize(Quaternion::new(t[3], t[0], t[1], t[2]));
-                let error = so3::log_quaternion(&(so3::quaternion(r) * target_rotation.inverse()));
-                let map = so3::left_jacobian_inverse(&error);
+                let error = log_error(r, at, target.x);
                 let omega = Vector3::from_column_slice(&target.xdot[at.xdot..at.xdot + 3]);
                 // log(exp(e) exp(−δ)) = e − J_r⁻¹(e) δ and J_r⁻¹ is the transpose of J_l⁻¹.
-                let rate = map.transpose() * omega;
+                let rate = so3::left_jacobian_inverse(&error).transpose() * omega;
                 rows.error[at.row..at.row + 3].copy_from_slice(error.as_slice());
                 rows.rate[at.row..at.row + 3].copy_from_slice(rate.as_slice());
-                RowMap::Log(error, map)
             }
         }
     }
@@ -261,9 +284,7 @@ impl RowSet {
         match self.coordinates {
             OrientationCoordinates::RollPitchYaw => RowMap::RollPitchYaw(rpy::RateMap::from_matrix(r)),
             OrientationCoordinates::Log => {
-                let t = &target[at.x..at.x + 4];
-                let rotation = UnitQuaternion::new_normalize(Quaternion::new(t[3], t[0], t[1], t[2]));
-                let error = so3::log_quaternion(&(so3::quaternion(r) * rotation.inverse()));
+                let error = log_error(r, at, target);
                 RowMap::Log(error, so3::left_jacobian_inverse(&error))
             }
         }
@@ -273,10 +294,11 @@ impl RowSet {
         for (row, root) in &self.weights {
             let ld = rows.ld;
             match part {
-                Part::Linear => {
-                    rows.jacobian
-                        .chunks_exact_mut(ld)
-                        .for_each(|c| multiply(root, &mut c[*row..]));
+                Part::Jacobian => rows
+                    .jacobian
+                    .chunks_exact_mut(ld)
+                    .for_each(|c| multiply(root, &mut c[*row..])),
+                Part::Residual => {
                     multiply(root, &mut rows.error[*row..]);
                     multiply(root, &mut rows.rate[*row..]);
                 }
@@ -291,7 +313,8 @@ impl RowSet {
 
 #[derive(Clone, Copy)]
 enum Part {
-    Linear,
+    Residual,
+    Jacobian,
     Second,
 }
 
@@ -307,6 +330,13 @@ fn multiply(root: &DMatrix<f64>, v: &mut [f64]) {
     for (i, out) in v[..n].iter_mut().enumerate() {
         *out = (0..n).map(|j| root[(i, j)] * copy[j]).sum();
     }
+}
+
+/// Rotation vector (rad, world) from the target orientation to `r`.
+fn log_error(r: &Matrix3<f64>, at: At, target: &[f64]) -> Vector3<f64> {
+    let t = &target[at.x..at.x + 4];
+    let target_rotation = UnitQuaternion::new_normalize(Quaternion::new(t[3], t[0], t[1], t[2]));
+    so3::log_quaternion(&(so3::quaternion(r) * target_rotation.inverse()))
 }
 
 /// An angle difference brought into [−π, π].

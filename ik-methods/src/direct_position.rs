@@ -30,13 +30,14 @@ use crate::gauss_newton::STEP_TOLERANCE_FIELD;
 use crate::registry::{Allowed, Field, Method, MethodInfo, N_FIELD, ParameterError, Parameters};
 use crate::sqp::{Block, Model, Residuals, Sqp, SqpParameters};
 use crate::start::{START_WORDS, Start, StartParameters};
+use crate::step_qp::Stack;
 use ik_core::evaluator::{Evaluator, Linearisation};
 use ik_core::formulation::{
     Declined, Formulation, Honours, Prepared, Solution, Stepper, Termination, Trust, Use,
 };
 use ik_core::problem::Problem;
 use ik_core::rows::Rows;
-use ik_core::step::ControlStep;
+use ik_core::step::{ControlStep, Sample};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -239,13 +240,46 @@ impl Model for CombinedRows {
         rows
     }
 
-    fn assemble(&self, lin: &Linearisation, dq: &[f64], dt_s: f64, out: &mut Residuals) {
-        regulated(&lin.soft, self.gamma, dq, dt_s, &mut out.soft);
-        let gamma = match self.rows {
-            RegulatedRows::Soft => 0.0,
-            RegulatedRows::Literal => self.gamma,
-        };
-        regulated(&lin.hard, gamma, dq, dt_s, &mut out.hard);
+    fn residuals(
+        &self,
+        eval: &Evaluator,
+        lin: &mut Linearisation,
+        target: Sample<'_>,
+        dq: &[f64],
+        dt_s: f64,
+        out: &mut Residuals,
+    ) {
+        regulate_residual(&lin.soft, self.gamma, dq, dt_s, &mut out.soft);
+        if self.rows == RegulatedRows::Literal {
+            eval.hard_jacobian(lin, target);
+            regulate_residual(&lin.hard, self.gamma, dq, dt_s, &mut out.hard);
+        }
+    }
+
+    fn derivatives(
+        &self,
+        eval: &Evaluator,
+        lin: &mut Linearisation,
+        target: Sample<'_>,
+        dq: &[f64],
+        out: &mut Residuals,
+    ) {
+        eval.soft_velocity_derivative(lin, target, dq);
+        regulate_matrix(&lin.soft, self.gamma, &mut out.soft);
+        match self.rows {
+            RegulatedRows::Soft => eval.hard_jacobian(lin, target),
+            RegulatedRows::Literal => {
+                eval.hard_velocity_derivative(lin, target, dq);
+                regulate_matrix(&lin.hard, self.gamma, &mut out.hard);
+            }
+        }
+    }
+
+    fn hard<'a>(&self, lin: &'a Linearisation, residuals: &'a Residuals) -> Stack<'a> {
+        match self.rows {
+            RegulatedRows::Soft => Stack::plain(&lin.hard),
+            RegulatedRows::Literal => residuals.hard.stack(),
+        }
     }
 
     fn curvature_weight(&self, residual: &[f64], i: usize, _task_ld: usize) -> f64 {
@@ -254,22 +288,20 @@ impl Model for CombinedRows {
     }
 }
 
-/// `e + γ (J dq − ẋΔt)` and its derivative `J + γ ∂(J dq)`.
-fn regulated(rows: &Rows, gamma: f64, dq: &[f64], dt_s: f64, out: &mut Block) {
+/// `e + γ (J dq − ẋΔt)`.
+fn regulate_residual(rows: &Rows, gamma: f64, dq: &[f64], dt_s: f64, out: &mut Block) {
     out.rows = rows.rows();
-    let ld = rows.ld();
-    out.residual[..ld].copy_from_slice(&rows.error[..ld]);
-    out.matrix[..rows.jacobian.len()].copy_from_slice(&rows.jacobian);
-    if gamma > 0.0 {
-        rows.multiply_into(dq, &mut out.motion);
-        let terms = out.motion.iter().zip(&rows.rate);
-        out.residual
-            .iter_mut()
-            .zip(terms)
-            .for_each(|(r, (m, rate))| *r += gamma * (m - rate * dt_s));
-        out.matrix
-            .iter_mut()
-            .zip(&rows.second)
-            .for_each(|(a, s)| *a += gamma * s);
+    rows.multiply_into(dq, &mut out.motion);
+    let terms = rows.error.iter().zip(&out.motion).zip(&rows.rate);
+    for (r, ((error, motion), rate)) in out.residual.iter_mut().zip(terms) {
+        *r = error + gamma * (motion - rate * dt_s);
+    }
+}
+
+/// Its derivative `J + γ ∂(J dq)`.
+fn regulate_matrix(rows: &Rows, gamma: f64, out: &mut Block) {
+    let terms = rows.jacobian.iter().zip(&rows.second);
+    for (a, (jacobian, second)) in out.matrix.iter_mut().zip(terms) {
+        *a = jacobian + gamma * second;
     }
 }

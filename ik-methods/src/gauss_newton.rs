@@ -30,7 +30,7 @@
 
 use crate::error_integration::{DAMPING_FIELD, damped_step};
 use crate::projected_cg::ProjectedCg;
-use crate::qp::Outcome;
+use crate::qp::{Outcome, QpStatus};
 use crate::registry::{Allowed, Field, Method, MethodInfo, N_FIELD, Parameters};
 use crate::step_qp::{Stack, StepQp, conclude, stay};
 use ik_core::configuration::integrate_into;
@@ -214,7 +214,9 @@ impl GaussNewtonStepper {
             Inner::Direct => damped_step(&mut self.qp, &mut self.lin, step, &self.q, damping, eval),
             Inner::Cg => {
                 eval.linearise(&self.q, step.phase, step.targets.now(), &mut self.lin);
-                let iterations = self.cg.solve(&self.lin, damping, &mut self.qp.solution.x);
+                let Some(iterations) = self.cg.solve(&self.lin, damping, &mut self.qp.solution.x) else {
+                    return Outcome::Failed(QpStatus::Numerical);
+                };
                 eval.meter.minors(iterations);
                 if self.cg.violation(&self.lin, &self.qp.solution.x) <= MET {
                     return Outcome::Solved;

@@ -55,8 +55,9 @@ impl ProjectedCg {
             .fold(0.0, f64::max)
     }
 
-    /// Solves at the linearised configuration into `d`; returns the number of iterations.
-    pub(crate) fn solve(&mut self, lin: &Linearisation, damping: f64, d: &mut [f64]) -> u32 {
+    /// Solves at the linearised configuration into `d`; returns the number of iterations, none if the gradient is not
+    /// finite.
+    pub(crate) fn solve(&mut self, lin: &Linearisation, damping: f64, d: &mut [f64]) -> Option<u32> {
         factorise_gram(&lin.hard, &mut self.gram);
         // d₀ = −J_hᵀ (J_h J_hᵀ)⁻¹ e_h meets the rows.
         let m = lin.hard.rows();
@@ -79,6 +80,9 @@ impl ProjectedCg {
             *p = -g;
         }
         let mut rg = dot(&self.residual, &self.projected);
+        if !rg.is_finite() {
+            return None;
+        }
         let goal = TOLERANCE * TOLERANCE * rg;
         let limit = u32::try_from(d.len()).unwrap_or(u32::MAX);
         let mut iterations = 0;
@@ -102,7 +106,7 @@ impl ProjectedCg {
             }
             rg = next;
         }
-        iterations
+        Some(iterations)
     }
 
     /// `residual = projected = P residual`, P the orthogonal projector onto the null space of J_h; refined once.

@@ -18,7 +18,7 @@ use ik_core::configuration::{difference_into, integrate_into};
 use ik_core::evaluator::{Evaluator, Linearisation};
 use ik_core::formulation::{Solution, Termination};
 use ik_core::problem::Problem;
-use ik_core::step::ControlStep;
+use ik_core::step::{ControlStep, Sample};
 use std::sync::Arc;
 
 /// ρ is this many times the largest multiplier: just above 1, since a penalty far beyond the multipliers rejects good
@@ -41,8 +41,29 @@ pub(crate) trait Model: Send + std::fmt::Debug {
     where
         Self: Sized;
 
-    /// Writes r, c and their exact Jacobians at an iterate `dq` from q⁻. The second-order terms of `lin` are filled.
-    fn assemble(&self, lin: &Linearisation, dq: &[f64], dt_s: f64, out: &mut Residuals);
+    /// Writes r and c at an iterate `dq` from q⁻. The Jacobian of the hard rows of `lin` is not filled yet.
+    fn residuals(
+        &self,
+        eval: &Evaluator,
+        lin: &mut Linearisation,
+        target: Sample<'_>,
+        dq: &[f64],
+        dt_s: f64,
+        out: &mut Residuals,
+    );
+
+    /// Writes their exact Jacobians there, filling what of `lin` they are made of.
+    fn derivatives(
+        &self,
+        eval: &Evaluator,
+        lin: &mut Linearisation,
+        target: Sample<'_>,
+        dq: &[f64],
+        out: &mut Residuals,
+    );
+
+    /// c with its Jacobian: the hard rows of `lin` as they are, or what was made of them in `residuals`.
+    fn hard<'a>(&self, lin: &'a Linearisation, residuals: &'a Residuals) -> Stack<'a>;
 
     /// Weight of the Hessian of soft task row `i` in the Hessian of ½‖r‖² at dq = 0, where the rows have the value
     /// `residual` (`task_ld` is the padded number of task rows).
@@ -86,21 +107,6 @@ impl Block {
             residual: &self.residual,
         }
     }
-
-    /// Writes `residual + A d` into `motion`.
-    pub(crate) fn predict(&mut self, d: &[f64]) {
-        self.motion.copy_from_slice(&self.residual);
-        for (column, d) in self.matrix.chunks_exact(self.ld).zip(d) {
-            self.motion.iter_mut().zip(column).for_each(|(m, c)| *m += c * d);
-        }
-    }
-
-    /// `‖residual + A d‖₁` for d = 0 and for `d`.
-    fn absolute_sums(&mut self, d: &[f64]) -> (f64, f64) {
-        self.predict(d);
-        let sum = |v: &[f64]| v[..self.rows].iter().map(|r| r.abs()).sum();
-        (sum(&self.residual), sum(&self.motion))
-    }
 }
 
 /// Parameters of the iteration.
@@ -121,6 +127,8 @@ pub(crate) struct Sqp<M> {
     escape: Escape,
     now: Point,
     trial: Point,
+    /// Hard rows at the end of a program's step.
+    predicted: Vec<f64>,
 }
 
 /// An iterate with everything evaluated there.
@@ -139,13 +147,15 @@ struct Point {
 impl<M: Model> Sqp<M> {
     pub(crate) fn new(problem: &Arc<Problem>, model: M, parameters: SqpParameters) -> Self {
         let (nq, nv) = (problem.robot().nq(), problem.robot().nv());
+        let hard = Block::new(problem.largest_hard_rows(), nv);
+        let predicted = hard.residual.clone();
         let point = Point {
             q: vec![0.0; nq],
             dq: vec![0.0; nv],
             lin: Linearisation::new(problem),
             residuals: Residuals {
                 soft: Block::new(M::soft_rows(problem.largest_soft_rows()), nv),
-                hard: Block::new(problem.largest_hard_rows(), nv),
+                hard,
             },
             half_squares: 0.0,
             violation: 0.0,
@@ -158,6 +168,7 @@ impl<M: Model> Sqp<M> {
             escape: Escape::new(problem, parameters.start),
             now: point.clone(),
             trial: point,
+            predicted,
         }
     }
 
@@ -213,19 +224,27 @@ impl<M: Model> Sqp<M> {
     }
 
     fn solve_qp(&mut self, step: &ControlStep<'_>, eval: &mut Evaluator) -> Outcome {
+        let now = &mut self.now;
+        self.model.derivatives(
+            eval,
+            &mut now.lin,
+            step.targets.now(),
+            &now.dq,
+            &mut now.residuals,
+        );
         self.qp.start(self.parameters.proximal);
-        self.qp.add(self.now.residuals.soft.stack());
-        self.qp.bound(&step.bounds, &self.now.dq);
-        let hard = &self.now.residuals.hard;
-        self.qp.solve(hard.stack(), hard.rows, eval)
+        self.qp.add(now.residuals.soft.stack());
+        self.qp.bound(&step.bounds, &now.dq);
+        let hard = self.model.hard(&now.lin, &now.residuals);
+        self.qp.solve(hard, now.lin.hard.rows(), eval)
     }
 
     /// Moves to the first of 1, ½, ¼ … of the step that brings enough; the last one is taken as it is, since standing
     /// still would only repeat the same program.
     fn line_search(&mut self, step: &ControlStep<'_>, eval: &mut Evaluator) {
         let rho = PENALTY_FACTOR * largest(&self.qp.solution.y);
-        let (violated, predicted) = self.now.residuals.hard.absolute_sums(&self.qp.solution.x);
-        let slope = dot(&self.qp.gradient, &self.qp.solution.x) - rho * (violated - predicted);
+        let predicted = self.predicted_violation();
+        let slope = dot(&self.qp.gradient, &self.qp.solution.x) - rho * (self.now.violation - predicted);
         let merit = self.now.half_squares + rho * self.now.violation;
         let mut t = 1.0;
         for halving in 0..=HALVINGS {
@@ -242,6 +261,14 @@ impl<M: Model> Sqp<M> {
         std::mem::swap(&mut self.now, &mut self.trial);
     }
 
+    /// ‖c + A d‖₁ at the end of the program's step.
+    fn predicted_violation(&mut self) -> f64 {
+        let now = &mut self.now;
+        let hard = self.model.hard(&now.lin, &now.residuals);
+        predict(hard, &self.qp.solution.x, &mut self.predicted);
+        one_norm(&self.predicted)
+    }
+
     /// Puts the trial point one program step away from the iterate.
     fn move_trial(&mut self, step: &ControlStep<'_>) {
         let robot = self.problem.robot();
@@ -255,19 +282,18 @@ impl<M: Model> Sqp<M> {
             Which::Trial => &mut self.trial,
         };
         let target = step.targets.now();
-        eval.linearise(&point.q, step.phase, target, &mut point.lin);
-        eval.velocity_derivative(&mut point.lin, target, &point.dq);
+        eval.residual(&point.q, step.phase, target, &mut point.lin);
+        let (lin, residuals) = (&mut point.lin, &mut point.residuals);
         self.model
-            .assemble(&point.lin, &point.dq, step.dt_s, &mut point.residuals);
+            .residuals(eval, lin, target, &point.dq, step.dt_s, residuals);
         point.half_squares = 0.5 * point.residuals.soft.residual.iter().map(|r| r * r).sum::<f64>();
-        let hard = &point.residuals.hard;
-        point.violation = hard.residual[..hard.rows].iter().map(|c| c.abs()).sum();
+        point.violation = one_norm(self.model.hard(&point.lin, &point.residuals).residual);
     }
 
     /// Multipliers of the last program, with everything but the plain task rows as the method's own gradient.
     fn claim(&mut self, out: &mut Solution) {
         let (lin, residuals) = (&self.now.lin, &self.now.residuals);
-        let (hard, m) = (&residuals.hard, residuals.hard.rows);
+        let (hard, m) = (self.model.hard(lin, residuals), lin.hard.rows());
         let claim = &mut out.claim;
         claim.has = true;
         claim.hard.fill(0.0);
@@ -291,6 +317,18 @@ impl<M: Model> Sqp<M> {
 enum Which {
     Now,
     Trial,
+}
+
+/// Writes `r + A d` into `out` (length ld).
+pub(crate) fn predict(stack: Stack<'_>, d: &[f64], out: &mut [f64]) {
+    out.copy_from_slice(stack.residual);
+    for (column, d) in stack.matrix.chunks_exact(stack.ld).zip(d) {
+        out.iter_mut().zip(column).for_each(|(o, c)| *o += c * d);
+    }
+}
+
+fn one_norm(v: &[f64]) -> f64 {
+    v.iter().map(|v| v.abs()).sum()
 }
 
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -10,7 +10,7 @@
 //! * `curvature`: the same displacement along a direction that keeps the hard rows to first order, and only if the exact
 //!   second-order model of the problem (multipliers of the first program, Hessians of all rows) says that it pays.
 
-use crate::sqp::{Block, Model, Residuals, dot};
+use crate::sqp::{Block, Model, Residuals, dot, predict};
 use crate::step_qp::{Stack, StepQp};
 use ik_core::evaluator::{Evaluator, Linearisation};
 use ik_core::problem::Problem;
@@ -188,20 +188,23 @@ impl Scratch {
         zero: &[f64],
     ) {
         let target = step.targets.now();
-        eval.linearise(step.q_prev, step.phase, target, &mut self.lin);
-        eval.velocity_derivative(&mut self.lin, target, zero);
-        model.assemble(&self.lin, zero, step.dt_s, &mut self.residuals);
+        let (lin, residuals) = (&mut self.lin, &mut self.residuals);
+        eval.residual(step.q_prev, step.phase, target, lin);
+        model.residuals(eval, lin, target, zero, step.dt_s, residuals);
+        model.derivatives(eval, lin, target, zero, residuals);
         self.qp.reset();
         self.qp.start(DIRECTION_WEIGHT);
         self.qp.add(self.residuals.soft.stack());
         self.qp.bound(&step.bounds, zero);
-        self.qp
-            .solve(self.residuals.hard.stack(), self.residuals.hard.rows, eval);
-        let m = self.residuals.hard.rows;
+        let m = self.lin.hard.rows();
+        self.qp.solve(model.hard(&self.lin, &self.residuals), m, eval);
         self.multipliers[..m].copy_from_slice(&self.qp.solution.y[..m]);
         self.bound_multipliers.copy_from_slice(&self.qp.solution.z);
         // Multipliers belong to the residuals that the program leaves, not to those it starts from.
-        self.residuals.soft.predict(&self.qp.solution.x);
+        let soft = &mut self.residuals.soft;
+        let mut predicted = std::mem::take(&mut soft.motion);
+        predict(soft.stack(), &self.qp.solution.x, &mut predicted);
+        soft.motion = predicted;
     }
 
     /// Change of the Lagrangian, to second order, when the chosen candidates move and the others stay; the displacement is
@@ -227,12 +230,12 @@ impl Scratch {
             let by = if moves(i) { c.move_by } else { 0.0 };
             (self.qp.lo[c.v], self.qp.hi[c.v]) = (by, by);
         }
-        let hard = &self.residuals.hard;
+        let hard = model.hard(&self.lin, &self.residuals);
         let still = Stack {
             residual: &self.lin_zero()[..hard.ld],
-            ..hard.stack()
+            ..hard
         };
-        if self.qp.solve(still, hard.rows, eval) != crate::qp::Outcome::Solved {
+        if self.qp.solve(still, self.lin.hard.rows(), eval) != crate::qp::Outcome::Solved {
             return 0.0;
         }
         self.direction.copy_from_slice(&self.qp.solution.x);

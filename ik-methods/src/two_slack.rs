@@ -29,10 +29,11 @@ use crate::gauss_newton::STEP_TOLERANCE_FIELD;
 use crate::registry::{Field, Method, MethodInfo, N_FIELD, ParameterError, Parameters};
 use crate::sqp::{Model, Residuals, Sqp, SqpParameters};
 use crate::start::{Start, StartParameters};
+use crate::step_qp::Stack;
 use ik_core::evaluator::{Evaluator, Linearisation};
 use ik_core::formulation::{Declined, Formulation, Prepared, Solution, Stepper, Termination};
 use ik_core::problem::Problem;
-use ik_core::step::ControlStep;
+use ik_core::step::{ControlStep, Sample};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -145,7 +146,15 @@ impl Model for SeparateRows {
         2 * rows.next_multiple_of(4)
     }
 
-    fn assemble(&self, lin: &Linearisation, dq: &[f64], dt_s: f64, out: &mut Residuals) {
+    fn residuals(
+        &self,
+        _eval: &Evaluator,
+        lin: &mut Linearisation,
+        _target: Sample<'_>,
+        dq: &[f64],
+        dt_s: f64,
+        out: &mut Residuals,
+    ) {
         let (soft, ld) = (&lin.soft, lin.soft.ld());
         let root = self.gamma.sqrt();
         let stack = &mut out.soft;
@@ -156,16 +165,31 @@ impl Model for SeparateRows {
         for (r, (m, rate)) in velocity.iter_mut().zip(stack.motion.iter().zip(&soft.rate)) {
             *r = root * (m - rate * dt_s);
         }
+    }
+
+    fn derivatives(
+        &self,
+        eval: &Evaluator,
+        lin: &mut Linearisation,
+        target: Sample<'_>,
+        dq: &[f64],
+        out: &mut Residuals,
+    ) {
+        eval.hard_jacobian(lin, target);
+        eval.soft_velocity_derivative(lin, target, dq);
+        let (soft, ld) = (&lin.soft, lin.soft.ld());
+        let root = self.gamma.sqrt();
+        let stack = &mut out.soft;
         let columns = soft.jacobian.chunks_exact(ld).zip(soft.second.chunks_exact(ld));
         for (out, (jacobian, second)) in stack.matrix.chunks_exact_mut(stack.ld).zip(columns) {
             let (position, velocity) = out.split_at_mut(ld);
             position.copy_from_slice(jacobian);
             velocity.iter_mut().zip(second).for_each(|(v, s)| *v = root * s);
         }
-        let hard = &mut out.hard;
-        hard.rows = lin.hard.rows();
-        hard.residual.copy_from_slice(&lin.hard.error[..hard.ld]);
-        hard.matrix.copy_from_slice(&lin.hard.jacobian);
+    }
+
+    fn hard<'a>(&self, lin: &'a Linearisation, _residuals: &'a Residuals) -> Stack<'a> {
+        Stack::plain(&lin.hard)
     }
 
     fn curvature_weight(&self, residual: &[f64], i: usize, task_ld: usize) -> f64 {

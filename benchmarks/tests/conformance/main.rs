@@ -12,19 +12,28 @@ use ik_core::formulation::{Formulation, Termination, Trust};
 use ik_core::problem::PhaseId;
 use ik_core::robot::embedded;
 use ik_core::task::Track;
-use ik_methods::registry::{Contestant, Entry, METHODS, entry};
+use ik_methods::registry::{Allowed, Contestant, Entry, METHODS, entry};
 use problems::{Fixture, all, coman, coman_stance, drive, step, target_at};
 use toml::Table;
 
 static NEWCOMER: Entry = entry::<newcomer::JacobianTranspose>();
 
-/// Registered methods and the newcomer, with default parameters.
+/// Registered methods and the newcomer: with default parameters, and with every word a parameter may be.
 fn contestants() -> Vec<Contestant> {
-    METHODS
-        .iter()
-        .chain([&NEWCOMER])
-        .map(|e| e.build(&Table::new()).unwrap())
-        .collect()
+    let mut contestants = Vec::new();
+    for entry in METHODS.iter().chain([&NEWCOMER]) {
+        contestants.push(entry.build(&Table::new()).unwrap());
+        for field in entry.fields() {
+            let Allowed::Words(words) = field.allowed else {
+                continue;
+            };
+            for word in words {
+                let set = Table::from_iter([(field.key.to_owned(), toml::Value::String((*word).to_owned()))]);
+                contestants.push(entry.build(&set).unwrap());
+            }
+        }
+    }
+    contestants
 }
 
 fn driver(contestant: &Contestant, fixture: &Fixture) -> Option<Driver> {

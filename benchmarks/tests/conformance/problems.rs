@@ -151,6 +151,18 @@ pub(crate) fn coman(drop: f64) -> Fixture {
     fixture
 }
 
+/// The same standing with both knees exactly on their limit, where the hard rows have rank 14 of 15.
+pub(crate) fn straight() -> Fixture {
+    let mut fixture = coman(0.0);
+    let lower = fixture.goal.clone();
+    fixture.name = "coman straight".into();
+    fixture.start = coman_stance(fixture.problem.robot(), 0.0);
+    fixture.goal = target_at(&fixture.problem, &fixture.start);
+    // The centre of mass of the crouched pose, feet and torso as they are.
+    fixture.goal[..3].copy_from_slice(&lower[..3]);
+    fixture
+}
+
 /// Standing upright with both knees at `knee`: hips and ankles share the bend by the lengths of the leg, soles flat at z = 0.
 pub(crate) fn coman_stance(robot: &Robot, knee: f64) -> Vec<f64> {
     let (thigh, shank, ankle) = (0.2258, 0.2010, 0.09);
@@ -184,6 +196,7 @@ fn arm(id: &str, tasks: impl Fn(FrameId) -> Vec<(Track, Priority)>, boundary: Bo
 /// Every fixture of the small set.
 pub(crate) fn all() -> Vec<Fixture> {
     let soft_pose = |f| vec![(Track::Pose(f), compromised())];
+    let uneven = Priority::Compromised(Weights::Diagonal(vec![4.0, 16.0, 2.0, 1.0, 2.0, 8.0]));
     let hard_position = |f| {
         vec![
             (Track::Position(f), Priority::Hard),
@@ -200,7 +213,14 @@ pub(crate) fn all() -> Vec<Fixture> {
         arm("arm7", soft_pose, Boundary::Ellipse { margin: 0.0 }),
         arm("arm7", hard_position, Boundary::Box),
         arm("slider-arm", soft_pose, Boundary::Box),
+        arm("arm6", |f| vec![(Track::Pose(f), Priority::Hard)], Boundary::Box),
+        arm(
+            "arm7",
+            |f| vec![(Track::Pose(f), uneven.clone())],
+            Boundary::Ellipse { margin: 0.05 },
+        ),
         coman(0.02),
+        straight(),
     ]
 }
 

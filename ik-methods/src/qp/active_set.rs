@@ -16,7 +16,7 @@ use super::dual::Dual;
 use super::elimination::{DEPENDENT, Elimination, MAX_UNKNOWNS, NEARLY_DEPENDENT, Rows};
 use super::kernels::{max_abs, max_abs_or_nan};
 use super::reduced::Reduced;
-use super::{Qp, QpSolution, QpSolver, QpStatus};
+use super::{Qp, QpSolution, QpSolver, QpStatus, kkt_residuals};
 
 /// A reduced residual below this fraction of the gradient's terms is rounding: 100 times what the sums of
 /// about 20 terms leave.
@@ -40,6 +40,9 @@ const CORRECTION_LIMIT: u32 = 100;
 /// A lower bound above its upper bound by more than this times max(1, |bound|) makes the box empty; less is
 /// rounding of an interval that is a point (lengths in m and rad).
 const EMPTY_BOX: f64 = 1e-12;
+
+/// Rows missed by more than this (m, rad) by an answer that left nearly dependent ones out are not met.
+const ROWS_LOST: f64 = 1e-8;
 
 /// Violation, in units of the tolerance, at which an infeasible verdict is believed without a second look
 /// from a freshly computed point.
@@ -256,7 +259,8 @@ impl QpSolver for ActiveSet {
         out.clear_for(qp);
         let status = self.attempt(qp, NEARLY_DEPENDENT, out);
         out.minors += tried;
-        status
+        let lost = status == QpStatus::Solved && kkt_residuals(qp, out).equality > ROWS_LOST;
+        if lost { QpStatus::Infeasible } else { status }
     }
 
     fn reset(&mut self) {
