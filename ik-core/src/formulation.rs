@@ -43,7 +43,8 @@ pub struct Prepared {
 /// What a formulation promises on the problem it was prepared for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Honours {
-    /// The returned q lies in the intervals of the step.
+    /// The returned q lies in the intervals of the step, unless it ended without a single major or as `Numerical`: then
+    /// the robot stays at q⁻, also where the intervals force a motion.
     pub boundary: bool,
     /// Hard rows are met whenever the boundary allows it (as far as the budget goes).
     pub hard_rows: bool,
@@ -118,7 +119,8 @@ pub enum Termination {
     Budget,
     /// The hard rows do not fit the boundary (or contradict each other): their violation was minimised first.
     HardRowsRelaxed {
-        /// Euclidean norm of the linearised hard rows that remained (m and rad mixed).
+        /// Euclidean norm of the hard rows that remain (m and rad mixed): at the returned q for iterating methods, in the
+        /// linearisation for those that take one step.
         residual: f64,
     },
     /// The target cannot be reached by this much.

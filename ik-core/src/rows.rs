@@ -28,7 +28,7 @@ pub struct RowLayout {
 #[derive(Clone, Debug)]
 pub struct RowSet {
     blocks: Vec<Block>,
-    weights: Vec<(usize, DMatrix<f64>)>,
+    weights: Vec<(usize, Factor)>,
     groups: Vec<RowGroup>,
     rows: usize,
     coordinates: OrientationCoordinates,
@@ -93,18 +93,32 @@ impl RowLayout {
     }
 }
 
-/// Symmetric square root of a weight matrix; none for the identity.
-fn square_root(weights: &Weights, rows: usize) -> Option<DMatrix<f64>> {
-    let q = match weights {
+/// A factor R of a weight matrix, Q = RᵀR.
+#[derive(Clone, Debug)]
+enum Factor {
+    Diagonal(Vec<f64>),
+    /// Upper triangular, so that it multiplies a vector in place.
+    Upper(DMatrix<f64>),
+}
+
+/// The factor of a weight matrix; none for the identity.
+fn square_root(weights: &Weights, rows: usize) -> Option<Factor> {
+    match weights {
         #[allow(clippy::float_cmp, reason = "exactly one means nothing to do")]
-        Weights::Uniform(w) if *w == 1.0 => return None,
-        Weights::Uniform(w) => DMatrix::from_diagonal_element(rows, rows, *w),
-        Weights::Diagonal(d) => DMatrix::from_diagonal(&nalgebra::DVector::from_column_slice(d)),
-        Weights::Matrix(m) => DMatrix::from_fn(rows, rows, |i, j| m[i][j]),
-    };
-    let eigen = q.symmetric_eigen();
-    let root = eigen.eigenvalues.map(|l| l.max(0.0).sqrt());
-    Some(&eigen.eigenvectors * DMatrix::from_diagonal(&root) * eigen.eigenvectors.transpose())
+        Weights::Uniform(w) if *w == 1.0 => None,
+        Weights::Uniform(w) => Some(Factor::Diagonal(vec![w.sqrt(); rows])),
+        Weights::Diagonal(d) => Some(Factor::Diagonal(d.iter().map(|w| w.sqrt()).collect())),
+        Weights::Matrix(m) => {
+            // Q may be singular: QR of its symmetric square root instead of a Cholesky factorisation.
+            let eigen = DMatrix::from_fn(rows, rows, |i, j| m[i][j]).symmetric_eigen();
+            let root = eigen.eigenvalues.map(|l| l.max(0.0).sqrt());
+            Some(Factor::Upper(
+                (DMatrix::from_diagonal(&root) * eigen.eigenvectors.transpose())
+                    .qr()
+                    .r(),
+            ))
+        }
+    }
 }
 
 impl RowSet {
@@ -318,17 +332,16 @@ enum Part {
     Second,
 }
 
-/// Largest posture block whose weighting fits on the stack; larger ones are weighted in pieces of the diagonal.
-const STACK_ROWS: usize = 64;
-
-/// `v ← root v` in place for the leading rows of `v`.
-fn multiply(root: &DMatrix<f64>, v: &mut [f64]) {
-    let n = root.nrows();
-    let mut copy = [0.0; STACK_ROWS];
-    debug_assert!(n <= STACK_ROWS, "robots have fewer coordinates");
-    copy[..n].copy_from_slice(&v[..n]);
-    for (i, out) in v[..n].iter_mut().enumerate() {
-        *out = (0..n).map(|j| root[(i, j)] * copy[j]).sum();
+/// `v ← R v` in place for the leading rows of `v`.
+fn multiply(root: &Factor, v: &mut [f64]) {
+    match root {
+        Factor::Diagonal(d) => v.iter_mut().zip(d).for_each(|(v, d)| *v *= d),
+        Factor::Upper(r) => {
+            // Row i needs only entries from i on, which are still the old ones.
+            for i in 0..r.nrows() {
+                v[i] = (i..r.ncols()).map(|j| r[(i, j)] * v[j]).sum();
+            }
+        }
     }
 }
 

@@ -35,7 +35,7 @@ use ik_core::evaluator::{Evaluator, Linearisation};
 use ik_core::formulation::{
     Declined, Formulation, Honours, Prepared, Solution, Stepper, Termination, Trust, Use,
 };
-use ik_core::problem::Problem;
+use ik_core::problem::{Kind, Problem};
 use ik_core::rows::Rows;
 use ik_core::step::{ControlStep, Sample};
 use serde::{Deserialize, Serialize};
@@ -173,10 +173,8 @@ impl Method for DirectPosition {
 impl Formulation for DirectPosition {
     fn prepare(&self, problem: &Arc<Problem>) -> Result<Prepared, Declined> {
         let p = &self.parameters;
-        let model = CombinedRows {
-            gamma: p.gamma,
-            rows: p.rows,
-        };
+        let gamma = regulator(problem, p.gamma);
+        let model = CombinedRows { gamma, rows: p.rows };
         let sqp = Sqp::new(
             problem,
             model,
@@ -194,6 +192,14 @@ impl Formulation for DirectPosition {
             p.n,
             p.rows == RegulatedRows::Soft,
         ))
+    }
+}
+
+/// γ as it acts on this problem: a pose problem has no velocity to regulate.
+pub(crate) fn regulator(problem: &Problem, gamma: f64) -> f64 {
+    match problem.kind() {
+        Kind::Tracking => gamma,
+        Kind::Pose => 0.0,
     }
 }
 

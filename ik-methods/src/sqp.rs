@@ -6,7 +6,7 @@
 //!
 //! Each major linearises residuals r and hard rows c exactly (second-order kinematics included), takes the Gauss–Newton
 //! Hessian plus a proximal weight μ around the iterate (which vanishes at the solution), solves the quadratic program and
-//! searches along its step on the L1 merit ½‖r‖² + ρ‖c‖₁. It stops when the step is below the tolerance; the gradient of
+//! searches along its step on the L1 merit ½‖r‖² + ρ‖c‖₁ (on ‖c‖₂ where the hard rows had to be relaxed). It stops when the step is below the tolerance; the gradient of
 //! the Lagrangian is then below (‖A‖² + μ) times the tolerance, so step size and KKT residual end together. It never stops
 //! on a small decrease: leaving a straight knee gains only 1e-9 m² at first (notes §3).
 
@@ -140,8 +140,6 @@ struct Point {
     residuals: Residuals,
     /// ½‖r‖².
     half_squares: f64,
-    /// ‖c‖₁.
-    violation: f64,
 }
 
 impl<M: Model> Sqp<M> {
@@ -158,14 +156,17 @@ impl<M: Model> Sqp<M> {
                 hard,
             },
             half_squares: 0.0,
-            violation: 0.0,
         };
         Self {
             problem: Arc::clone(problem),
             model,
             parameters,
             qp: StepQp::new(problem),
-            escape: Escape::new(problem, parameters.start),
+            escape: Escape::new(
+                problem,
+                parameters.start,
+                M::soft_rows(problem.largest_soft_rows()),
+            ),
             now: point.clone(),
             trial: point,
             predicted,
@@ -214,13 +215,27 @@ impl<M: Model> Sqp<M> {
                 if outcome == Outcome::Solved {
                     self.claim(out);
                 }
+                let outcome = self.remaining(outcome);
                 self.move_trial(step);
                 std::mem::swap(&mut self.now, &mut self.trial);
                 return (Termination::Converged, outcome);
             }
-            self.line_search(step, eval);
+            self.line_search(outcome, step, eval);
         }
-        (Termination::Budget, outcome)
+        (Termination::Budget, self.remaining(outcome))
+    }
+
+    /// A relaxed outcome with what is left of the hard rows at the iterate, not what its program promised.
+    fn remaining(&self, outcome: Outcome) -> Outcome {
+        match outcome {
+            Outcome::Relaxed { .. } => {
+                let rows = self.model.hard(&self.now.lin, &self.now.residuals);
+                Outcome::Relaxed {
+                    residual: two_norm(rows.residual),
+                }
+            }
+            other => other,
+        }
     }
 
     fn solve_qp(&mut self, step: &ControlStep<'_>, eval: &mut Evaluator) -> Outcome {
@@ -241,18 +256,30 @@ impl<M: Model> Sqp<M> {
 
     /// Moves to the first of 1, ½, ¼ … of the step that brings enough; the last one is taken as it is, since standing
     /// still would only repeat the same program.
-    fn line_search(&mut self, step: &ControlStep<'_>, eval: &mut Evaluator) {
-        let rho = PENALTY_FACTOR * largest(&self.qp.solution.y);
-        let predicted = self.predicted_violation();
-        let slope = dot(&self.qp.gradient, &self.qp.solution.x) - rho * (self.now.violation - predicted);
-        let merit = self.now.half_squares + rho * self.now.violation;
+    fn line_search(&mut self, outcome: Outcome, step: &ControlStep<'_>, eval: &mut Evaluator) {
+        self.predict_hard_rows();
+        let merit = match outcome {
+            // Rows that do not fit come first, in the norm in which the program fitted them.
+            Outcome::Relaxed { .. } => Merit::HardRows,
+            _ => Merit::Exact {
+                rho: PENALTY_FACTOR * largest(&self.qp.solution.y),
+            },
+        };
+        let hard = self.model.hard(&self.now.lin, &self.now.residuals).residual;
+        let slope = match merit {
+            Merit::HardRows => two_norm(&self.predicted) - two_norm(hard),
+            Merit::Exact { rho } => {
+                dot(&self.qp.gradient, &self.qp.solution.x)
+                    + rho * (one_norm(&self.predicted) - one_norm(hard))
+            }
+        };
+        let start = self.merit(merit, Which::Now);
         let mut t = 1.0;
         for halving in 0..=HALVINGS {
             self.move_trial(step);
             self.evaluate(step, eval, Which::Trial);
-            let reached = self.trial.half_squares + rho * self.trial.violation;
-            let enough = merit + SUFFICIENT * t * slope.min(0.0) + ROUNDING * merit;
-            if reached <= enough || halving == HALVINGS {
+            let enough = start + SUFFICIENT * t * slope.min(0.0) + ROUNDING * start;
+            if self.merit(merit, Which::Trial) <= enough || halving == HALVINGS {
                 break;
             }
             t *= 0.5;
@@ -261,12 +288,22 @@ impl<M: Model> Sqp<M> {
         std::mem::swap(&mut self.now, &mut self.trial);
     }
 
-    /// ‖c + A d‖₁ at the end of the program's step.
-    fn predicted_violation(&mut self) -> f64 {
-        let now = &mut self.now;
-        let hard = self.model.hard(&now.lin, &now.residuals);
+    fn merit(&self, merit: Merit, which: Which) -> f64 {
+        let point = match which {
+            Which::Now => &self.now,
+            Which::Trial => &self.trial,
+        };
+        let hard = self.model.hard(&point.lin, &point.residuals).residual;
+        match merit {
+            Merit::HardRows => two_norm(hard),
+            Merit::Exact { rho } => point.half_squares + rho * one_norm(hard),
+        }
+    }
+
+    /// Writes c + A d at the end of the program's step.
+    fn predict_hard_rows(&mut self) {
+        let hard = self.model.hard(&self.now.lin, &self.now.residuals);
         predict(hard, &self.qp.solution.x, &mut self.predicted);
-        one_norm(&self.predicted)
     }
 
     /// Puts the trial point one program step away from the iterate.
@@ -287,7 +324,6 @@ impl<M: Model> Sqp<M> {
         self.model
             .residuals(eval, lin, target, &point.dq, step.dt_s, residuals);
         point.half_squares = 0.5 * point.residuals.soft.residual.iter().map(|r| r * r).sum::<f64>();
-        point.violation = one_norm(self.model.hard(&point.lin, &point.residuals).residual);
     }
 
     /// Multipliers of the last program, with everything but the plain task rows as the method's own gradient.
@@ -325,6 +361,19 @@ pub(crate) fn predict(stack: Stack<'_>, d: &[f64], out: &mut [f64]) {
     for (column, d) in stack.matrix.chunks_exact(stack.ld).zip(d) {
         out.iter_mut().zip(column).for_each(|(o, c)| *o += c * d);
     }
+}
+
+/// What the line search decreases.
+#[derive(Clone, Copy)]
+enum Merit {
+    /// ½‖r‖² + ρ‖c‖₁.
+    Exact { rho: f64 },
+    /// ‖c‖₂.
+    HardRows,
+}
+
+fn two_norm(v: &[f64]) -> f64 {
+    dot(v, v).sqrt()
 }
 
 fn one_norm(v: &[f64]) -> f64 {

@@ -24,7 +24,9 @@
 //! ## Deviations
 //! Deviation: eq. (9) prints γ εᵀ Q ε with the Q of the positions; the weighted rows of `ik_core::rows` carry √Q already.
 
-use crate::direct_position::{GAMMA_FIELD, KICK_FIELD, PROXIMAL_FIELD, START_FIELD, check_start, prepared};
+use crate::direct_position::{
+    GAMMA_FIELD, KICK_FIELD, PROXIMAL_FIELD, START_FIELD, check_start, prepared, regulator,
+};
 use crate::gauss_newton::STEP_TOLERANCE_FIELD;
 use crate::registry::{Field, Method, MethodInfo, N_FIELD, ParameterError, Parameters};
 use crate::sqp::{Model, Residuals, Sqp, SqpParameters};
@@ -107,7 +109,9 @@ impl Formulation for TwoSlack {
         let p = &self.parameters;
         let sqp = Sqp::new(
             problem,
-            SeparateRows { gamma: p.gamma },
+            SeparateRows {
+                gamma: regulator(problem, p.gamma),
+            },
             SqpParameters {
                 proximal: p.proximal,
                 step_tolerance: p.step_tolerance,
@@ -143,7 +147,7 @@ struct SeparateRows {
 
 impl Model for SeparateRows {
     fn soft_rows(rows: usize) -> usize {
-        2 * rows.next_multiple_of(4)
+        2 * rows.next_multiple_of(4).max(4)
     }
 
     fn residuals(
