@@ -285,21 +285,41 @@ impl RowStore {
         self.keys.contains(key)
     }
 
-    /// Adds a row and writes the file.
+    /// Adds a row, in place of one of the same key, and writes the file.
     ///
     /// # Errors
     /// [`RecordError::NotFinite`] for a row that JSON cannot hold, Io if the file cannot be written; the store is then as
     /// before.
     pub fn push(&mut self, row: Row) -> Result<(), RecordError> {
         let line = to_line(&self.path, &row)?;
-        let before = self.text.len();
-        self.text.push_str(&line);
-        if let Err(error) = write_atomically(&self.path, &self.text) {
-            self.text.truncate(before);
+        let key = RowKey::of(&row);
+        let replaces = self.keys.contains(&key);
+        let mut text = if replaces {
+            self.text_without(&key)?
+        } else {
+            std::mem::take(&mut self.text)
+        };
+        let before = text.len();
+        text.push_str(&line);
+        if let Err(error) = write_atomically(&self.path, &text) {
+            if !replaces {
+                text.truncate(before);
+                self.text = text;
+            }
             return Err(error);
+        }
+        self.text = text;
+        if replaces {
+            self.rows.retain(|old| RowKey::of(old) != key);
         }
         self.remember(row);
         Ok(())
+    }
+
+    /// The lines of all rows but those of `key`.
+    fn text_without(&self, key: &RowKey) -> Result<String, RecordError> {
+        let kept = self.rows.iter().filter(|row| RowKey::of(row) != *key);
+        kept.map(|row| to_line(&self.path, row)).collect()
     }
 
     /// All rows, oldest first.

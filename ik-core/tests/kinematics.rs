@@ -366,3 +366,41 @@ fn static_torques_balance_virtual_work() {
         }
     }
 }
+
+#[test]
+fn weights_of_any_size_multiply_their_rows() {
+    // A chain of 70 joints; its posture weighted once by a number, once by the same number as a matrix.
+    let links: String = (0..=70).map(|i| format!("<link name=\"l{i}\"/>")).collect();
+    let joints: String = (0..70)
+        .map(|i| {
+            format!(
+                "<joint name=\"j{i}\" type=\"continuous\"><parent link=\"l{i}\"/><child link=\"l{}\"/>\
+                 <origin xyz=\"0.1 0 0\"/><axis xyz=\"0 0 1\"/></joint>",
+                i + 1
+            )
+        })
+        .collect();
+    let text = format!("<robot name=\"chain\">{links}{joints}</robot>");
+    let options = ik_core::robot::UrdfOptions { root: Root::Fixed };
+    let robot = Arc::new(Robot::from_urdf_str(&text, "chain", &options).unwrap());
+    let full = (0..70)
+        .map(|i| (0..70).map(|j| if i == j { 2.0 } else { 0.0 }).collect())
+        .collect();
+    for weights in [
+        ik_core::task::Weights::Uniform(2.0),
+        ik_core::task::Weights::Matrix(full),
+    ] {
+        let problem = problem(
+            &robot,
+            Track::Posture,
+            OrientationCoordinates::Log,
+            Priority::Compromised(weights),
+        );
+        let mut lin = Linearisation::new(&problem);
+        let (x, xdot) = (vec![0.5; 70], vec![0.0; 70]);
+        let target = Sample { x: &x, xdot: &xdot };
+        Evaluator::new(&problem).linearise(&[0.0; 70], PHASE, target, &mut lin);
+        let square: f64 = lin.soft.error.iter().map(|e| e * e).sum();
+        assert!((square - 70.0 * 2.0 * 0.25).abs() < 1e-12, "{square}");
+    }
+}

@@ -103,13 +103,13 @@ struct RunArgs {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Time step in s, instead of the suite's
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     dt: Option<f64>,
     /// Speed limit of every joint in rad/s or m/s, instead of the robot's
-    #[arg(long, value_name = "RAD_PER_S")]
+    #[arg(long, value_name = "RAD_PER_S", allow_negative_numbers = true)]
     velocity: Option<f64>,
     /// Safety margin of the ellipse in rad or m, instead of the suite's
-    #[arg(long, value_name = "RAD")]
+    #[arg(long, value_name = "RAD", allow_negative_numbers = true)]
     margin: Option<f64>,
     /// Where target rates come from: analytic, difference or zero
     #[arg(long, value_name = "RATES", value_parser = rates)]

@@ -53,6 +53,14 @@ pub(super) fn settings(options: &[String]) -> Result<Table, InputError> {
         let parsed: Result<Table, _> = format!("value = {text}").parse();
         let value = parsed.ok().and_then(|mut t| t.remove("value"));
         let value = value.unwrap_or_else(|| Value::String(text.trim().to_owned()));
+        if value.as_array().is_some_and(Vec::is_empty) {
+            return Err(InputError::value(
+                "command line",
+                "--set",
+                option,
+                "at least one value",
+            ));
+        }
         if table.insert(key.trim().to_owned(), value).is_some() {
             return Err(InputError::value(
                 "command line",

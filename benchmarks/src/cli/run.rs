@@ -16,7 +16,7 @@ use crate::suite::{Case, Selection, Suite, Variation};
 use crate::summary;
 use ik_methods::registry::{Contestant, method};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -34,6 +34,7 @@ pub(super) fn everything(args: &Everything, out: &mut dyn Write) -> Result<(), F
         scenarios(args.effort),
     )?;
     let session = session(args.effort);
+    check_folder(&args.out)?;
     let store = RowStore::open(&args.out)?;
     let reusable = is_reusable(&store, &session);
     if !reusable && !args.effort.fresh && args.out != Path::new(DEFAULT_FOLDER) {
@@ -49,6 +50,8 @@ pub(super) fn everything(args: &Everything, out: &mut dyn Write) -> Result<(), F
         store: Some(store),
         dir: args.out.clone(),
         traces: Traces::Written,
+        reusable: suites.iter().map(|s| s.id.clone()).collect(),
+        kept: 0,
         rows: Vec::new(),
     };
     run_heats(&heats, &session, &mut recorder)?;
@@ -56,6 +59,7 @@ pub(super) fn everything(args: &Everything, out: &mut dyn Write) -> Result<(), F
     let summary = summary::write_summary(&args.out, &recorder.rows, &analysis)?;
     write!(out, "{}", summary::terminal_table(&recorder.rows))?;
     draw(&args.out, out)?;
+    recorder.tell_kept(out)?;
     Ok(writeln!(
         out,
         "{} rows in {}; {}",
@@ -72,6 +76,8 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write) -> Result<(), Failure> {
         .iter()
         .map(|name| Suite::load(name))
         .collect::<Result<_, _>>()?;
+    let embedded: BTreeSet<String> = Suite::load_embedded()?.into_iter().map(|s| s.id).collect();
+    check_ids(&args.suites, &suites, &embedded)?;
     let selection = Selection {
         methods: args.methods.clone(),
         set: settings(&args.set)?,
@@ -83,6 +89,7 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write) -> Result<(), Failure> {
     let session = session(args.effort);
     let store = match &args.out {
         Some(dir) => {
+            check_folder(dir)?;
             let store = RowStore::open(dir)?;
             Some(if args.effort.fresh {
                 start_over(dir)?
@@ -102,6 +109,8 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write) -> Result<(), Failure> {
         store,
         dir,
         traces,
+        reusable: embedded,
+        kept: 0,
         rows: Vec::new(),
     };
     run_heats(&heats, &session, &mut recorder)?;
@@ -110,7 +119,55 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write) -> Result<(), Failure> {
             .iter()
             .try_for_each(|heat| dump_step(heat, k, &recorder.dir, out))?;
     }
-    Ok(write!(out, "{}", summary::terminal_table(&recorder.rows))?)
+    write!(out, "{}", summary::terminal_table(&recorder.rows))?;
+    Ok(recorder.tell_kept(out)?)
+}
+
+/// One session knows one suite by an id, and an embedded id means the embedded suite.
+fn check_ids(names: &[String], suites: &[Suite], embedded: &BTreeSet<String>) -> Result<(), InputError> {
+    for (i, (name, suite)) in names.iter().zip(suites).enumerate() {
+        let of_file = *name != suite.id;
+        if of_file && embedded.contains(&suite.id) {
+            return Err(InputError::value(
+                name,
+                "id",
+                &suite.id,
+                "an id that no embedded suite has",
+            ));
+        }
+        if suites[..i].iter().any(|other| other.id == suite.id) {
+            return Err(InputError::value(
+                name,
+                "id",
+                &suite.id,
+                "each suite once in a session",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// A folder that holds our names without our rows is somebody else's. The default folder is ours, also where a session was
+/// interrupted before its first row.
+fn check_folder(dir: &Path) -> Result<(), InputError> {
+    if dir == Path::new(DEFAULT_FOLDER) || dir.join(ROWS_FILE).exists() {
+        return Ok(());
+    }
+    match ["summary.md", "traces", "figures", "instances"]
+        .iter()
+        .find(|name| dir.join(name).exists())
+    {
+        Some(name) => {
+            let allowed = format!("a new folder, or one with a {ROWS_FILE}");
+            Err(InputError::value(
+                "command line",
+                "--out",
+                dir.join(name).display(),
+                &allowed,
+            ))
+        }
+        None => Ok(()),
+    }
 }
 
 fn scenarios(effort: EffortArgs) -> Scenarios {
@@ -162,9 +219,16 @@ fn start_over(dir: &Path) -> Result<RowStore, RecordError> {
         let removed = fs::remove_file(&file);
         gone(file, removed)?;
     }
-    for folder in ["traces", "figures", "instances"].map(|name| dir.join(name)) {
-        let removed = fs::remove_dir_all(&folder);
-        gone(folder, removed)?;
+    for (folder, ending) in [("traces", "csv"), ("figures", "svg"), ("instances", "json")] {
+        let entries = fs::read_dir(dir.join(folder)).into_iter().flatten().flatten();
+        for path in entries.map(|entry| entry.path()) {
+            if path.extension().is_some_and(|e| e == ending) {
+                let removed = fs::remove_file(&path);
+                gone(path, removed)?;
+            }
+        }
+        // A folder that holds something else stays.
+        let _ = fs::remove_dir(dir.join(folder));
     }
     RowStore::open(dir)
 }
@@ -181,6 +245,10 @@ struct Recorder {
     store: Option<RowStore>,
     dir: PathBuf,
     traces: Traces,
+    /// Suites that the revision pins down; one from a file may have changed since its rows were made.
+    reusable: BTreeSet<String>,
+    /// Runs that were not made again.
+    kept: usize,
     /// The rows of this session, those found on disk among them, in the order of the plan.
     rows: Vec<Row>,
 }
@@ -191,7 +259,8 @@ impl Recorder {
         let store = self
             .store
             .as_ref()
-            .filter(|_| is_pinned(&session.revision) && !is_quick(&session.notes))?;
+            .filter(|_| is_pinned(&session.revision) && !is_quick(&session.notes))
+            .filter(|_| self.reusable.contains(&case.suite))?;
         let parameters = recorded(&contestant.parameters);
         let key = RowKey::new(
             &contestant.id,
@@ -215,6 +284,16 @@ impl Recorder {
             .rev()
             .find(|row| RowKey::of(row) == key && complete(row))
             .cloned()
+    }
+
+    fn tell_kept(&self, out: &mut dyn Write) -> std::io::Result<()> {
+        match self.kept {
+            0 => Ok(()),
+            kept => writeln!(
+                out,
+                "{kept} finished runs of this revision kept; --fresh makes them again"
+            ),
+        }
     }
 
     /// Writes the traces of a heat in parallel, then its rows in order.
@@ -256,6 +335,7 @@ fn run_heats(heats: &[Heat], session: &Session, recorder: &mut Recorder) -> Resu
             .filter(|(_, row)| row.is_none())
             .map(|(c, _)| c.clone())
             .collect();
+        recorder.kept += found.len() - missing.len();
         (missing.len()..found.len()).for_each(|_| progress.run_skipped());
         let mut made = Vec::new();
         if !missing.is_empty() {

@@ -34,6 +34,13 @@ const TERMINAL: [(&str, usize); 12] = [
     ("ok", 5),
 ];
 
+/// What the columns mean, in as many columns.
+const LEGEND: &str = "
+rms, max: centre-of-mass error. hard: largest miss of a hard task (m or rad). exit: when both knees
+left the straight leg for good. majors: outer iterations per step. us: median step time; x ik1: the
+same relative to ik1. g<=0: inside the ellipse, whatever boundary was given. ok: survived.
+";
+
 /// A table that fits [`TERMINAL_WIDTH`] columns.
 ///
 /// Errors are in mm, `hard` is in m or rad, whichever is larger. In a suite with more than three scenarios the first is
@@ -53,13 +60,16 @@ pub fn terminal_table(rows: &[Row]) -> String {
             push_line(&mut text, &line_cells);
         }
     }
+    if !text.is_empty() {
+        text.push_str(LEGEND);
+    }
     text
 }
 
 fn push_line(text: &mut String, cells: &[String]) {
     let mut line = String::new();
     for (index, (cell, (_, width))) in cells.iter().zip(TERMINAL).enumerate() {
-        let short: String = cell.chars().take(width).collect();
+        let short = shortened(cell, width);
         let written = if index < 2 {
             write!(line, "{short:<width$} ")
         } else {
@@ -69,6 +79,21 @@ fn push_line(text: &mut String, cells: &[String]) {
     }
     text.push_str(line.trim_end());
     text.push('\n');
+}
+
+/// At most `width` characters; what is too long is cut in the middle, since labels differ at their ends.
+fn shortened(cell: &str, width: usize) -> String {
+    let length = cell.chars().count();
+    if length <= width {
+        return cell.to_owned();
+    }
+    let head = width / 2;
+    let tail = width - head - 1;
+    cell.chars()
+        .take(head)
+        .chain(['…'])
+        .chain(cell.chars().skip(length - tail))
+        .collect()
 }
 
 fn terminal_lines(runs: &[&Labelled<'_>]) -> Vec<Line> {
@@ -126,7 +151,8 @@ fn line(scenario: &str, runs: &[&Labelled<'_>]) -> Line {
         values: vec![
             number(worst(&|m| m.quality.com_error_rms_m.map(|e| e * 1e3))),
             number(worst(&|m| m.quality.com_error_max_m.map(|e| e * 1e3))),
-            worst(&|m| Some(hard_max(&m.quality))).map_or(NONE.to_owned(), |h| format!("{h:.1e}")),
+            worst(&|m| (!m.quality.hard_error_max.is_empty()).then(|| hard_max(&m.quality)))
+                .map_or(NONE.to_owned(), |h| format!("{h:.1e}")),
             seconds(worst(&|m| m.quality.singularity_exit_s)),
             worst(&|m| Some(m.effort.majors_mean)).map_or(NONE.to_owned(), |m| format!("{m:.1}")),
             number(middle(&|m| Some(m.effort.step_us_median))),
