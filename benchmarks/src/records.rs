@@ -116,7 +116,8 @@ pub struct Quality {
     pub singularity_exit_s: Option<f64>,
     /// Mean over t ≥ 1 s of the sum of squared static joint torques (N²m²), where asked for.
     pub torque_squared_mean_n2m2: Option<f64>,
-    /// All finite, limit violation ≤ 1e-6 rad, boundary value ≤ 1e-4 (of a polygon: excess ≤ 1e-6 rad instead), hard errors
+    /// All finite, limit violation ≤ 1e-6 rad, boundary value ≤ 1e-4 (a polygon: excess ≤ 1e-6 rad
+    /// instead, a box: no speed limit passed), hard errors
     /// < 1e-3, centre-of-mass error below the tolerance of the suite.
     pub survived: bool,
 }

@@ -7,6 +7,7 @@ use super::torque::static_torques;
 use super::{Posture, Readable, Referee, Run, Sample};
 use crate::records::Quality;
 use faer::MatRef;
+use ik_core::boundary::Boundary;
 use ik_core::problem::Problem;
 use ik_core::robot::Robot;
 use ik_core::task::Track;
@@ -41,15 +42,19 @@ pub(super) fn judge(referee: &Referee, run: &Run<'_>) -> Quality {
     judge_ranks(problem, &readable, &mut quality);
     quality.singularity_exit_s = exit_time(referee, &readable, run.dt_s);
     quality.torque_squared_mean_n2m2 = torque_squared_mean(referee, &readable);
-    quality.survived = readable.complete && survives(&quality, referee.spec.com_tolerance_m);
+    quality.survived =
+        readable.complete && survives(&quality, referee.problem.boundary(), referee.spec.com_tolerance_m);
     quality
 }
 
-pub(super) fn survives(quality: &Quality, com_tolerance_m: f64) -> bool {
-    // A polygon reaches outside the ellipse of eq. (6): who was given one is held to it.
-    let inside = match quality.polygon_excess_max_rad {
-        Some(excess) => excess <= LIMIT_TOLERANCE,
-        None => quality.boundary_value_max.is_none_or(|g| g <= BOUNDARY_TOLERANCE),
+pub(super) fn survives(quality: &Quality, boundary: &Boundary, com_tolerance_m: f64) -> bool {
+    // Polygon and box reach outside the ellipse of eq. (6): who was given one is held to it.
+    let inside = match boundary {
+        Boundary::Polygon { .. } => quality
+            .polygon_excess_max_rad
+            .is_none_or(|e| e <= LIMIT_TOLERANCE),
+        Boundary::Box => quality.velocity_ratio_max <= 1.0 + LIMIT_TOLERANCE,
+        _ => quality.boundary_value_max.is_none_or(|g| g <= BOUNDARY_TOLERANCE),
     };
     inside
         && quality.position_limit_violation_max_rad <= LIMIT_TOLERANCE

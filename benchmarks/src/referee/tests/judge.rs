@@ -255,19 +255,26 @@ fn limits_and_boundaries() {
     );
 }
 
-/// A polygon reaches outside the ellipse: a run inside it survives with a positive value of eq. (6), one outside does not.
+/// Polygon and box reach outside the ellipse: a run inside its own boundary survives with a positive value of eq. (6).
 #[test]
 fn a_run_survives_the_boundary_it_was_given() {
-    let survives = |polygon_excess_max_rad, g| {
+    let survives = |boundary: Boundary, excess: f64, ratio: f64, g: f64| {
         let quality = Quality {
-            polygon_excess_max_rad,
+            polygon_excess_max_rad: Some(excess),
+            velocity_ratio_max: ratio,
             boundary_value_max: Some(g),
             ..Quality::default()
         };
-        super::super::judge::survives(&quality, 0.08)
+        super::super::judge::survives(&quality, &boundary, 0.08)
     };
-    assert!(survives(Some(0.0), 0.3) && !survives(Some(1e-3), -0.3));
-    assert!(!survives(None, 0.3) && survives(None, -0.3));
+    let polygon = Boundary::Polygon {
+        approach_per_s: 8.0,
+        exit_speed: 0.02,
+    };
+    assert!(survives(polygon, 0.0, 2.0, 0.3) && !survives(polygon, 1e-3, 0.5, -0.3));
+    assert!(survives(Boundary::Box, 1.0, 1.0, 0.3) && !survives(Boundary::Box, 0.0, 1.1, -0.3));
+    let ellipse = Boundary::Ellipse { margin: 0.0 };
+    assert!(survives(ellipse, 1.0, 2.0, -0.3) && !survives(ellipse, 0.0, 0.5, 0.3));
 }
 
 #[test]
