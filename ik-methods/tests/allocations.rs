@@ -7,16 +7,16 @@
     reason = "a counting global allocator in a test binary"
 )]
 
+mod common;
+
+use common::legs;
 use ik_core::boundary::Boundary;
 use ik_core::driver::{Driver, StepInput};
-use ik_core::problem::{Kind, Phase, PhaseId, Problem, ProblemParts, Supplies};
-use ik_core::robot::embedded;
+use ik_core::problem::PhaseId;
 use ik_core::step::Window;
-use ik_core::task::{OrientationCoordinates, Priority, Task, Track, Weights};
 use ik_methods::registry::METHODS;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
-use std::sync::Arc;
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
@@ -42,48 +42,6 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static GLOBAL: Counting = Counting;
 
-fn problem() -> Arc<Problem> {
-    let robot = Arc::new(embedded("coman-legs").unwrap());
-    let frame = |name: &str| robot.frame(name).unwrap();
-    let tasks = [
-        (
-            "com",
-            Track::CentreOfMass,
-            Priority::Compromised(Weights::Diagonal(vec![1.0, 2.0, 3.0])),
-        ),
-        ("left", Track::Pose(frame("l_sole")), Priority::Hard),
-        ("right", Track::Pose(frame("r_sole")), Priority::Hard),
-        ("torso", Track::Orientation(frame("Waist")), Priority::Hard),
-    ];
-    let parts = ProblemParts {
-        robot: Arc::clone(&robot),
-        tasks: tasks
-            .iter()
-            .map(|(name, track, _)| Task {
-                name: (*name).into(),
-                track: *track,
-            })
-            .collect(),
-        phases: vec![Phase {
-            name: "all".into(),
-            tasks: tasks
-                .iter()
-                .enumerate()
-                .map(|(i, (_, _, p))| (i, p.clone()))
-                .collect(),
-        }],
-        boundary: Boundary::Ellipse { margin: 0.0 },
-        objectives: vec![],
-        kind: Kind::Tracking,
-        supplies: Supplies {
-            rates: true,
-            preview_s: 0.0,
-        },
-        orientation: OrientationCoordinates::RollPitchYaw,
-    };
-    Arc::new(Problem::new(parts).unwrap())
-}
-
 /// A squat through the straight knee and back with a rolling torso: active bounds, relaxed rows, line searches.
 fn sample(k: u32) -> Vec<f64> {
     let t = f64::from(k) * 0.01;
@@ -100,7 +58,7 @@ fn sample(k: u32) -> Vec<f64> {
 
 #[test]
 fn a_step_allocates_nothing_where_it_is_promised() {
-    let problem = problem();
+    let problem = legs(Boundary::Ellipse { margin: 0.0 }, vec![1.0, 2.0, 3.0]);
     let mut promised = 0;
     for entry in METHODS {
         let variants: &[&str] = match entry.info().id {

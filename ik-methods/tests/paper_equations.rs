@@ -3,15 +3,16 @@
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
+mod common;
+
+use common::legs;
 use ik_core::boundary::Boundary;
 use ik_core::configuration::difference;
 use ik_core::driver::{Driver, StepInput};
 use ik_core::evaluator::{Evaluator, Linearisation};
-use ik_core::problem::{Kind, Phase, PhaseId, Problem, ProblemParts, Supplies};
-use ik_core::robot::embedded;
+use ik_core::problem::{PhaseId, Problem};
 use ik_core::rows::Rows;
 use ik_core::step::{Sample, Window};
-use ik_core::task::{OrientationCoordinates, Priority, Task, Track, Weights};
 use ik_methods::qp::{ClarabelQp, MatRef, Qp, QpSolution, QpSolver, QpStatus};
 use ik_methods::registry::method;
 use nalgebra::{DMatrix, DVector};
@@ -19,48 +20,6 @@ use std::sync::Arc;
 
 const R: f64 = 1e-2;
 const DT: f64 = 0.005;
-
-fn legs(boundary: Boundary) -> Arc<Problem> {
-    let robot = Arc::new(embedded("coman-legs").unwrap());
-    let frame = |name: &str| robot.frame(name).unwrap();
-    let tasks = [
-        (
-            "com",
-            Track::CentreOfMass,
-            Priority::Compromised(Weights::Diagonal(vec![1.0, 2.0, 0.5])),
-        ),
-        ("left", Track::Pose(frame("l_sole")), Priority::Hard),
-        ("right", Track::Pose(frame("r_sole")), Priority::Hard),
-        ("torso", Track::Orientation(frame("Waist")), Priority::Hard),
-    ];
-    let parts = ProblemParts {
-        robot: Arc::clone(&robot),
-        tasks: tasks
-            .iter()
-            .map(|(name, track, _)| Task {
-                name: (*name).into(),
-                track: *track,
-            })
-            .collect(),
-        phases: vec![Phase {
-            name: "all".into(),
-            tasks: tasks
-                .iter()
-                .enumerate()
-                .map(|(i, (_, _, p))| (i, p.clone()))
-                .collect(),
-        }],
-        boundary,
-        objectives: vec![],
-        kind: Kind::Tracking,
-        supplies: Supplies {
-            rates: true,
-            preview_s: 0.0,
-        },
-        orientation: OrientationCoordinates::RollPitchYaw,
-    };
-    Arc::new(Problem::new(parts).unwrap())
-}
 
 /// Standing with both knees at `knee`, soles flat.
 fn stance(problem: &Problem, knee: f64) -> Vec<f64> {
@@ -98,7 +57,7 @@ struct Fixture {
 
 impl Fixture {
     fn new(boundary: Boundary, knee: f64, by: f64) -> Self {
-        let problem = legs(boundary);
+        let problem = legs(boundary, vec![1.0, 2.0, 0.5]);
         let q = stance(&problem, knee);
         let mut page = ik_core::kinematics::Page::new(problem.robot());
         ik_core::kinematics::forward(problem.robot(), &q, &mut page);
