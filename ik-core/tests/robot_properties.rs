@@ -563,8 +563,9 @@ fn swap_quoted(text: &mut String, start: usize, other: prop::sample::Index) {
     text.replace_range(from..to, &value);
 }
 
-const TEXTS: [&str; 5] = [
+const TEXTS: [&str; 6] = [
     include_str!("../robots/coman.urdf"),
+    include_str!("../robots/bioloid.urdf"),
     include_str!("../robots/arm6.urdf"),
     include_str!("../robots/arm7.urdf"),
     include_str!("../robots/slider-arm.urdf"),

@@ -30,6 +30,10 @@ pub const EMBEDDED: &[EmbeddedRobot] = &[
         summary: "coman-legs with the knees of the hardware, from -0.1745 rad, which pass through the straight leg",
     },
     EmbeddedRobot {
+        id: "bioloid",
+        summary: "Bioloid-type humanoid of point masses, free flyer and 18 revolute joints without limits, 1.7 kg",
+    },
+    EmbeddedRobot {
         id: "arm6",
         summary: "generic arm, fixed base, 6 revolute joints, spherical wrist",
     },
@@ -48,6 +52,7 @@ pub const EMBEDDED: &[EmbeddedRobot] = &[
 ];
 
 const COMAN: &str = include_str!("../../robots/coman.urdf");
+const BIOLOID: &str = include_str!("../../robots/bioloid.urdf");
 const ARM6: &str = include_str!("../../robots/arm6.urdf");
 const ARM7: &str = include_str!("../../robots/arm7.urdf");
 const SLIDER_ARM: &str = include_str!("../../robots/slider-arm.urdf");
@@ -83,6 +88,7 @@ pub fn embedded(id: &str) -> Result<Robot, RobotError> {
         "coman" => read(COMAN, "robots/coman.urdf", Root::Floating),
         "coman-legs" => straight_knee_limit(&coman_legs()?.renamed(id)),
         "coman-legs-hyperextension" => Ok(coman_legs()?.renamed(id)),
+        "bioloid" => read(BIOLOID, "robots/bioloid.urdf", Root::Floating),
         "arm6" => read(ARM6, "robots/arm6.urdf", Root::Fixed),
         "arm7" => read(ARM7, "robots/arm7.urdf", Root::Fixed),
         "slider-arm" => read(SLIDER_ARM, "robots/slider-arm.urdf", Root::Fixed),
