@@ -43,6 +43,18 @@ pub(crate) fn for_each_column(
             write(3 + k, lane::cross(axis, arm), axis);
         }
     }
+    for_each_joint_column(robot, page, body, p, write);
+}
+
+/// The part of [`for_each_column`] that is not the root's: each joint on the path to `body`.
+#[inline(always)]
+pub(crate) fn for_each_joint_column(
+    robot: &Robot,
+    page: &Page,
+    body: usize,
+    p: Lane,
+    mut write: impl FnMut(usize, Lane, Lane),
+) {
     let first = robot.root().nv();
     for &i in robot.path(body) {
         let joint = &robot.aligned[i];

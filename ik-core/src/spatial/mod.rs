@@ -1,4 +1,4 @@
-//! Rotations and the small vector algebra under the kinematics.
+//! Rotations, screws and the small vector algebra under the kinematics.
 //!
 //! Conventions used everywhere in the workspace: rotation matrices `r_a_b` map coordinates in frame B to coordinates
 //! in frame A; angular velocities and rotation increments are expressed in the *world* frame and act from the left,
@@ -6,4 +6,5 @@
 
 pub(crate) mod lane;
 pub mod rpy;
+pub mod screw;
 pub mod so3;
