@@ -123,6 +123,11 @@ pub enum Termination {
         /// linearisation for those that take one step.
         residual: f64,
     },
+    /// One step of an integrating method through (nearly) dependent hard rows: it was damped there.
+    Damped {
+        /// Euclidean norm of the hard rows that the damping leaves in the linearisation (m and rad mixed).
+        residual: f64,
+    },
     /// The target cannot be reached by this much.
     OutOfReach {
         /// Missing distance (m).
@@ -155,6 +160,7 @@ impl Termination {
             Self::Stepped => "stepped",
             Self::Budget => "budget",
             Self::HardRowsRelaxed { .. } => "hard-rows-relaxed",
+            Self::Damped { .. } => "damped",
             Self::OutOfReach { .. } => "out-of-reach",
             Self::Numerical(_) => "numerical",
             Self::Failed(_) => "failed",

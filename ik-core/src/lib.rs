@@ -19,3 +19,4 @@ pub mod rows;
 pub mod spatial;
 pub mod step;
 pub mod task;
+pub mod weights;

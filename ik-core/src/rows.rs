@@ -12,8 +12,9 @@ use crate::robot::{Robot, Root};
 use crate::spatial::lane::{self, Lane};
 use crate::spatial::{rpy, so3};
 use crate::step::Sample;
-use crate::task::{OrientationCoordinates, Priority, Track, Weights};
-use nalgebra::{DMatrix, Matrix3, Quaternion, UnitQuaternion, Vector3};
+use crate::task::{OrientationCoordinates, Priority, Track};
+use crate::weights::WeightFactor;
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 /// Rows of one phase.
 #[derive(Clone, Debug)]
@@ -28,7 +29,7 @@ pub struct RowLayout {
 #[derive(Clone, Debug)]
 pub struct RowSet {
     blocks: Vec<Block>,
-    weights: Vec<(usize, Factor)>,
+    weights: Vec<(usize, WeightFactor)>,
     groups: Vec<RowGroup>,
     rows: usize,
     coordinates: OrientationCoordinates,
@@ -82,7 +83,7 @@ impl RowLayout {
                 Priority::Hard => hard.push(parts, *task, track, slots[*task]),
                 Priority::Compromised(weights) => {
                     let rows = track.rows(&parts.robot);
-                    if let Some(root) = square_root(weights, rows) {
+                    if let Some(root) = WeightFactor::new(weights, rows) {
                         soft.weights.push((soft.rows, root));
                     }
                     soft.push(parts, *task, track, slots[*task]);
@@ -90,34 +91,6 @@ impl RowLayout {
             }
         }
         Self { hard, soft }
-    }
-}
-
-/// A factor R of a weight matrix, Q = RᵀR.
-#[derive(Clone, Debug)]
-enum Factor {
-    Diagonal(Vec<f64>),
-    /// Upper triangular, so that it multiplies a vector in place.
-    Upper(DMatrix<f64>),
-}
-
-/// The factor of a weight matrix; none for the identity.
-fn square_root(weights: &Weights, rows: usize) -> Option<Factor> {
-    match weights {
-        #[allow(clippy::float_cmp, reason = "exactly one means nothing to do")]
-        Weights::Uniform(w) if *w == 1.0 => None,
-        Weights::Uniform(w) => Some(Factor::Diagonal(vec![w.sqrt(); rows])),
-        Weights::Diagonal(d) => Some(Factor::Diagonal(d.iter().map(|w| w.sqrt()).collect())),
-        Weights::Matrix(m) => {
-            // Q may be singular: QR of its symmetric square root instead of a Cholesky factorisation.
-            let eigen = DMatrix::from_fn(rows, rows, |i, j| m[i][j]).symmetric_eigen();
-            let root = eigen.eigenvalues.map(|l| l.max(0.0).sqrt());
-            Some(Factor::Upper(
-                (DMatrix::from_diagonal(&root) * eigen.eigenvectors.transpose())
-                    .qr()
-                    .r(),
-            ))
-        }
     }
 }
 
@@ -311,15 +284,15 @@ impl RowSet {
                 Part::Jacobian => rows
                     .jacobian
                     .chunks_exact_mut(ld)
-                    .for_each(|c| multiply(root, &mut c[*row..])),
+                    .for_each(|c| root.multiply(&mut c[*row..])),
                 Part::Residual => {
-                    multiply(root, &mut rows.error[*row..]);
-                    multiply(root, &mut rows.rate[*row..]);
+                    root.multiply(&mut rows.error[*row..]);
+                    root.multiply(&mut rows.rate[*row..]);
                 }
                 Part::Second => rows
                     .second
                     .chunks_exact_mut(ld)
-                    .for_each(|c| multiply(root, &mut c[*row..])),
+                    .for_each(|c| root.multiply(&mut c[*row..])),
             }
         }
     }
@@ -330,19 +303,6 @@ enum Part {
     Residual,
     Jacobian,
     Second,
-}
-
-/// `v ← R v` in place for the leading rows of `v`.
-fn multiply(root: &Factor, v: &mut [f64]) {
-    match root {
-        Factor::Diagonal(d) => v.iter_mut().zip(d).for_each(|(v, d)| *v *= d),
-        Factor::Upper(r) => {
-            // Row i needs only entries from i on, which are still the old ones.
-            for i in 0..r.nrows() {
-                v[i] = (i..r.ncols()).map(|j| r[(i, j)] * v[j]).sum();
-            }
-        }
-    }
 }
 
 /// Rotation vector (rad, world) from the target orientation to `r`.

@@ -111,6 +111,23 @@ fn inverse_jacobian_coefficient(angle_squared: f64) -> (f64, f64) {
     (coefficient, (-slope - coefficient) / t)
 }
 
+/// Left Jacobian `J_l(phi)`: a rotation `exp(phi)` whose rotation vector changes at `phi_dot` turns at the world angular
+/// velocity `J_l(phi) phi_dot`.
+pub fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
+    let t = phi.norm_squared();
+    let (a, b) = if t < SMALL_ANGLE_SQUARED {
+        (
+            0.5 - t * (1.0 / 24.0 - t / 720.0),
+            1.0 / 6.0 - t * (1.0 / 120.0 - t / 5040.0),
+        )
+    } else {
+        let angle = t.sqrt();
+        ((1.0 - angle.cos()) / t, (angle - angle.sin()) / (t * angle))
+    };
+    let s = skew(phi);
+    Matrix3::identity() + s * a + s * s * b
+}
+
 /// Inverse left Jacobian `J_l⁻¹(phi)`: `log(exp(δ) exp(phi)) = phi + J_l⁻¹(phi) δ + O(δ²)`.
 ///
 /// Its transpose is the inverse right Jacobian. Singular at |phi| = 2π, which `log` never returns.
@@ -145,6 +162,12 @@ mod tests {
         fn log_inverts_exp_at_every_scale(phi in vector(std::f64::consts::PI)) {
             prop_assert!((log(&exp(&phi)) - phi).norm() <= 1e-14 + 1e-13 * phi.norm() || phi.norm() > 3.1);
             prop_assert!((exp(&log(&exp(&phi))) - exp(&phi)).norm() < 1e-13);
+        }
+
+        #[test]
+        fn the_left_jacobian_is_the_inverse_of_its_inverse(phi in vector(3.0)) {
+            let product = left_jacobian(&phi) * left_jacobian_inverse(&phi);
+            prop_assert!((product - Matrix3::identity()).norm() < 1e-13);
         }
 
         #[test]
