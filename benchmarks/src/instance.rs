@@ -278,6 +278,9 @@ fn detail(termination: &Termination) -> String {
         Termination::HardRowsRelaxed { residual } => {
             format!("linearised hard rows miss by {residual:e} (m, rad)")
         }
+        Termination::Damped { residual } => {
+            format!("dependent hard rows were damped; {residual} of them is left")
+        }
         Termination::OutOfReach { missing_m } => format!("the target is {missing_m} m out of reach"),
         Termination::Numerical(reason) => (*reason).to_owned(),
         Termination::Failed(failure) => format!("{failure:?}"),

@@ -5,6 +5,7 @@
 
 pub mod baselines;
 pub mod constrained_qp;
+pub mod davies;
 pub mod direct_position;
 pub mod error_integration;
 pub mod gauss_newton;

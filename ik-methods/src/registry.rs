@@ -3,6 +3,7 @@
 
 use crate::baselines::{PenaltyCg, PenaltyLbfgs};
 use crate::constrained_qp::ConstrainedQp;
+use crate::davies::{self, Davies};
 use crate::direct_position::DirectPosition;
 use crate::error_integration::ErrorIntegration;
 use crate::gauss_newton::GaussNewton;
@@ -21,6 +22,8 @@ pub static METHODS: &[Entry] = &[
     entry::<ConstrainedQp>(),
     entry::<DirectPosition>(),
     entry::<TwoSlack>(),
+    entry::<Davies>(),
+    preset::<Davies>(davies::OPEN_LOOP),
     entry::<PenaltyCg>(),
     entry::<PenaltyLbfgs>(),
 ];
@@ -158,7 +161,18 @@ pub struct Entry {
     info: MethodInfo,
     fields: &'static [Field],
     defaults: fn() -> Table,
+    /// Defaults that a preset changes.
+    preset: &'static [(&'static str, f64)],
     build: fn(Table) -> Result<Arc<dyn Formulation>, ParameterError>,
+}
+
+/// A method under a name of its own with other defaults.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Preset {
+    /// What it is.
+    pub info: MethodInfo,
+    /// Numbers that differ from the method's defaults.
+    pub values: &'static [(&'static str, f64)],
 }
 
 /// A method with all its parameters resolved, ready to be prepared for problems.
@@ -174,10 +188,19 @@ pub struct Contestant {
 
 /// The registry line of `M`.
 pub const fn entry<M: Method>() -> Entry {
-    Entry {
+    preset::<M>(Preset {
         info: M::INFO,
+        values: &[],
+    })
+}
+
+/// The registry line of `M` with other defaults.
+pub const fn preset<M: Method>(preset: Preset) -> Entry {
+    Entry {
+        info: preset.info,
         fields: M::Parameters::HELP,
         defaults: defaults::<M>,
+        preset: preset.values,
         build: build::<M>,
     }
 }
@@ -209,7 +232,13 @@ impl Entry {
 
     /// Its parameters with their default values.
     pub fn defaults(&self) -> Table {
-        (self.defaults)()
+        let mut table = (self.defaults)();
+        let changed = self
+            .preset
+            .iter()
+            .map(|(key, value)| ((*key).to_owned(), Value::Float(*value)));
+        table.extend(changed);
+        table
     }
 
     /// True if it iterates within a step, its budget of majors being the parameter `n`.

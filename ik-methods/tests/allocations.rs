@@ -65,6 +65,12 @@ fn a_step_allocates_nothing_where_it_is_promised() {
             "ik2" => &["", "inner = 'cg'"],
             "ik4" => &["", "start = 'plain'", "start = 'curvature'", "rows = 'literal'"],
             "ik5" => &["", "start = 'curvature'"],
+            "davies" => &[
+                "",
+                "integrator = 'rk4'\nrates = 'analytic'",
+                "orientation = 'euler-rates'",
+                "damping = 0.01",
+            ],
             _ => &[""],
         };
         for variant in variants {

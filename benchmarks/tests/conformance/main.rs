@@ -130,8 +130,9 @@ fn at_the_solution_a_method_stays() {
             contestant.id,
             fixture.name
         );
+        // Four are one step of a Runge-Kutta rule.
         assert!(
-            said[0].1.majors <= 3 || driver.honours().counts == Trust::Declared,
+            said[0].1.majors <= 4 || driver.honours().counts == Trust::Declared,
             "{} on {}: {:?}",
             contestant.id,
             fixture.name,
@@ -146,6 +147,14 @@ fn repeated_steps_reach_a_reachable_target() {
         // Whoever descends along gradients gets there roughly; the formulations of the paper get there exactly, slowed
         // down only by their damping in the directions in which an arm is weak.
         let exact = contestant.id.starts_with("ik");
+        let correction = contestant
+            .parameters
+            .get("correction")
+            .and_then(toml::Value::as_float);
+        if correction == Some(0.0) {
+            // An open loop integrates the rates of its targets, and these rest.
+            return;
+        }
         if !exact && fixture.name == "coman straight" {
             // A gradient sees next to nothing of a straight knee.
             return;
@@ -310,9 +319,10 @@ fn claimed_multipliers_satisfy_the_conditions_the_referee_computes() {
     let mut judged = 0;
     each(|contestant, fixture, mut driver| {
         let spec = JudgeSpec {
-            com_tolerance_m: 0.08,
+            soft_tolerance_m: 0.08,
             exit_joints: vec![],
             torque_supports: vec![],
+            soles: vec![],
         };
         let referee = Referee::new(&fixture.problem, spec).unwrap();
         let mut x = fixture.goal.clone();

@@ -1,0 +1,518 @@
+//! The circuits of one phase, sorted into groups that share no unknown, and their rows at a configuration.
+//!
+//! Each circuit is written at its own task point: row shift `rows 3..6 −= [p]ₓ rows 0..3`, which changes no solution and
+//! keeps the condition number the same wherever the robot stands. Written so, a 3P3R task chain reads `[ω; v]` directly,
+//! and eliminating its monitored joints (the left null space of their columns) is dropping their rows. What is left is
+//! `A x = y` in the real joints and, where no task imposes the root, the root.
+//!
+//! Circuits are coupled by shared joints only, and by the root if it is free: with an imposed root and one task per limb
+//! the secondary matrix falls into one block per limb, which are solved one by one.
+
+use super::least_norm::{MOST_FREE, Stage};
+use super::virtual_chain::Instant;
+use ik_core::kinematics::Page;
+use ik_core::kinematics::screws::{for_each_screw, root_screws};
+use ik_core::problem::{Phase, Problem};
+use ik_core::robot::{Robot, Root};
+use ik_core::spatial::screw::Screw;
+use ik_core::task::{Priority, Track};
+use ik_core::weights::WeightFactor;
+use nalgebra::Vector3;
+
+/// Part of a task that closes one circuit: the task itself, or one joint of a posture.
+#[derive(Clone, Debug)]
+pub(super) struct Circuit {
+    pub(super) task: usize,
+    /// Joint coordinate of a posture's circuit.
+    pub(super) joint: Option<usize>,
+    /// Rows that are imposed.
+    pub(super) rows: usize,
+    /// Factor of the weights of a compromised task, for these rows.
+    weights: Option<WeightFactor>,
+}
+
+/// Circuits that share unknowns.
+#[derive(Clone, Debug)]
+pub(super) struct Group {
+    pub(super) hard: Vec<Circuit>,
+    pub(super) soft: Vec<Circuit>,
+    /// Joint coordinates of the group, ascending.
+    pub(super) joints: Vec<usize>,
+    /// Whether the root is among the unknowns.
+    pub(super) root: RootChain,
+    stages: [Stage; 2],
+    soft_rows: Vec<f64>,
+    x: Vec<f64>,
+}
+
+/// What the chain from the ground to the root does for a group of circuits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum RootChain {
+    /// Its rates are known: imposed, or the root is fixed.
+    Known,
+    /// Its six coordinates are unknown and cost nothing.
+    Free,
+}
+
+/// All circuits of one phase.
+#[derive(Clone, Debug)]
+pub(super) struct Circuits {
+    /// The hard pose task of a frame on the root link, if any: its chain is the root's.
+    pub(super) imposed_root: Option<usize>,
+    pub(super) groups: Vec<Group>,
+    /// Place of each joint coordinate within its group.
+    place: Vec<usize>,
+}
+
+/// How the rates of a group came out.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Quality {
+    /// Whether hard rows were dependent.
+    pub(super) dependent: bool,
+    /// Sum of squares that hard rows miss.
+    pub(super) missed_squared: f64,
+}
+
+/// λ of the two priorities.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Damping {
+    pub(super) hard: f64,
+    pub(super) soft: f64,
+    /// λ of hard rows that are dependent, at least.
+    pub(super) singular: f64,
+}
+
+impl Circuits {
+    pub(super) fn new(problem: &Problem, phase: &Phase) -> Self {
+        let robot = problem.robot();
+        let imposed_root = imposed_root(problem, phase);
+        let mut pieces: Vec<Piece> = phase
+            .tasks
+            .iter()
+            .filter(|(task, _)| Some(*task) != imposed_root)
+            .flat_map(|(task, priority)| pieces(problem, *task, priority, imposed_root))
+            .collect();
+        let mut groups = Vec::new();
+        let mut place = vec![0; robot.coordinates().len()];
+        while let Some(first) = pieces.pop() {
+            let mut members = vec![first];
+            let mut next = 0;
+            while next < members.len() {
+                let (shared, apart) = pieces.into_iter().partition(|p| p.touches(&members[next]));
+                pieces = apart;
+                members.extend::<Vec<_>>(shared);
+                next += 1;
+            }
+            groups.push(Group::new(members, robot, &mut place));
+        }
+        groups.reverse();
+        Self {
+            imposed_root,
+            groups,
+            place,
+        }
+    }
+
+    /// Writes the velocity (length nv, world axes) that closes all circuits while the primary joints move as imposed.
+    pub(super) fn solve(
+        &mut self,
+        problem: &Problem,
+        q: &[f64],
+        page: &Page,
+        instant: &Instant<'_>,
+        damping: Damping,
+        v: &mut [f64],
+    ) -> Quality {
+        v.fill(0.0);
+        let at = Closing {
+            problem,
+            q,
+            page,
+            instant,
+        };
+        let root = self.imposed_root.map_or_else(Screw::default, |task| {
+            let twist = at.root_twist(task);
+            v[..3].copy_from_slice(twist.linear.as_slice());
+            v[3..6].copy_from_slice(twist.angular.as_slice());
+            twist
+        });
+        let mut quality = Quality::default();
+        for group in &mut self.groups {
+            let found = group.solve(&at, &root, &self.place, damping, v);
+            quality.dependent |= found.dependent;
+            quality.missed_squared += found.missed_squared;
+        }
+        quality
+    }
+
+    /// Writes the hard rows of group `g` at a configuration, right-hand sides included, and returns them with their
+    /// width; the unknowns are the root's six, if they are, and the group's joints.
+    pub(super) fn hard_rows(&mut self, g: usize, at: &Closing<'_>) -> (&[f64], usize) {
+        let group = &mut self.groups[g];
+        group.fill_hard(at, &Screw::default(), &self.place);
+        (group.stages[0].rows(), group.stages[0].width())
+    }
+}
+
+/// The hard pose task of a frame on the root link, in a phase.
+fn imposed_root(problem: &Problem, phase: &Phase) -> Option<usize> {
+    let robot = problem.robot();
+    let on_root = |task: usize| match problem.tasks()[task].track {
+        Track::Pose(f) => robot.frames()[f.0].body == 0,
+        _ => false,
+    };
+    let mut hard = phase.tasks.iter().filter(|(_, p)| *p == Priority::Hard);
+    hard.find(|(task, _)| robot.root() == Root::Floating && on_root(*task))
+        .map(|(task, _)| *task)
+}
+
+/// A circuit with what it touches, before circuits are grouped.
+struct Piece {
+    circuit: Circuit,
+    hard: bool,
+    joints: Vec<usize>,
+    root: RootChain,
+}
+
+impl Piece {
+    fn touches(&self, other: &Self) -> bool {
+        let both_free = self.root == RootChain::Free && other.root == RootChain::Free;
+        both_free || self.joints.iter().any(|j| other.joints.contains(j))
+    }
+}
+
+fn pieces(problem: &Problem, task: usize, priority: &Priority, imposed_root: Option<usize>) -> Vec<Piece> {
+    let robot = problem.robot();
+    let track = problem.tasks()[task].track;
+    let rows = track.rows(robot);
+    let weights = match priority {
+        Priority::Hard => None,
+        Priority::Compromised(weights) => WeightFactor::new(weights, rows),
+    };
+    let hard = *priority == Priority::Hard;
+    let all: Vec<usize> = (0..robot.coordinates().len()).collect();
+    let on_path = |body: usize| {
+        let mut joints: Vec<usize> = robot
+            .path(body)
+            .iter()
+            .map(|&i| robot.joints()[i].coordinate)
+            .collect();
+        joints.sort_unstable();
+        joints.dedup();
+        joints
+    };
+    let root = match robot.root() {
+        Root::Floating if imposed_root.is_none() => RootChain::Free,
+        _ => RootChain::Known,
+    };
+    let whole = |joints: Vec<usize>, weights: Option<WeightFactor>| Piece {
+        circuit: Circuit {
+            task,
+            joint: None,
+            rows,
+            weights,
+        },
+        hard,
+        joints,
+        root,
+    };
+    match track {
+        Track::Position(f) | Track::Orientation(f) | Track::Pose(f) => {
+            vec![whole(on_path(robot.frames()[f.0].body), weights)]
+        }
+        Track::CentreOfMass => vec![whole(all, weights)],
+        Track::Posture => posture_pieces(task, hard, rows, weights),
+    }
+}
+
+/// One circuit per joint, or one for all if a weight matrix couples them.
+fn posture_pieces(task: usize, hard: bool, rows: usize, weights: Option<WeightFactor>) -> Vec<Piece> {
+    let one = |j: usize, weights| Piece {
+        circuit: Circuit {
+            task,
+            joint: Some(j),
+            rows: 1,
+            weights,
+        },
+        hard,
+        joints: vec![j],
+        root: RootChain::Known,
+    };
+    match weights {
+        None => (0..rows).map(|j| one(j, None)).collect(),
+        Some(WeightFactor::Diagonal(d)) => {
+            let scaled = |j: usize| one(j, Some(WeightFactor::Diagonal(vec![d[j]])));
+            (0..rows).map(scaled).collect()
+        }
+        Some(upper) => vec![Piece {
+            circuit: Circuit {
+                task,
+                joint: None,
+                rows,
+                weights: Some(upper),
+            },
+            hard,
+            joints: (0..rows).collect(),
+            root: RootChain::Known,
+        }],
+    }
+}
+
+impl Group {
+    fn new(mut members: Vec<Piece>, robot: &Robot, place: &mut [usize]) -> Self {
+        members.sort_by_key(|piece| (piece.circuit.task, piece.circuit.joint));
+        let mut joints: Vec<usize> = members.iter().flat_map(|piece| piece.joints.clone()).collect();
+        joints.sort_unstable();
+        joints.dedup();
+        for (local, &joint) in joints.iter().enumerate() {
+            place[joint] = local;
+        }
+        let free = members.iter().any(|piece| piece.root == RootChain::Free);
+        let root = if free { RootChain::Free } else { RootChain::Known };
+        let (hard, soft): (Vec<_>, Vec<_>) = members.into_iter().partition(|piece| piece.hard);
+        let circuits = |pieces: Vec<Piece>| pieces.into_iter().map(|p| p.circuit).collect::<Vec<_>>();
+        let (hard, soft) = (circuits(hard), circuits(soft));
+        let height = |circuits: &[Circuit]| circuits.iter().map(|c| c.rows).sum::<usize>();
+        let unknown = root.unknowns();
+        let stage = |circuits: &[Circuit]| Stage::new(height(circuits), unknown, joints.len());
+        debug_assert!(joints.len() <= robot.coordinates().len());
+        Self {
+            stages: [stage(&hard), stage(&soft)],
+            soft_rows: vec![0.0; height(&soft) * (unknown + joints.len() + 1)],
+            x: vec![0.0; joints.len()],
+            hard,
+            soft,
+            joints,
+            root,
+        }
+    }
+
+    fn fill_hard(&mut self, at: &Closing<'_>, root: &Screw, place: &[usize]) {
+        let rows = self.stages[0].clear(self.root.unknowns(), self.joints.len());
+        at.fill(&self.hard, self.root, root, place, rows, self.joints.len());
+    }
+
+    /// Rates of the group's joints (and root): hard circuits first, the compromised ones in what those leave.
+    fn solve(
+        &mut self,
+        at: &Closing<'_>,
+        root: &Screw,
+        place: &[usize],
+        damping: Damping,
+        v: &mut [f64],
+    ) -> Quality {
+        self.fill_hard(at, root, place);
+        let [hard, soft] = &mut self.stages;
+        let independent = hard.factorise();
+        let lambda = if independent {
+            damping.hard
+        } else {
+            damping.hard.max(damping.singular)
+        };
+        let missed = hard.decide(lambda);
+        let (mut u, x) = ([0.0; MOST_FREE], &mut self.x);
+        x.fill(0.0);
+        if !self.soft.is_empty() {
+            self.soft_rows.fill(0.0);
+            at.fill(
+                &self.soft,
+                self.root,
+                root,
+                place,
+                &mut self.soft_rows,
+                self.joints.len(),
+            );
+            hard.follow(&mut self.soft_rows, soft);
+            soft.factorise();
+            soft.decide(damping.soft);
+            let (free, costed) = hard.left();
+            soft.finish(&mut u[..free], &mut x[..costed]);
+        }
+        let unknown = self.root.unknowns();
+        hard.finish(&mut u[..unknown], x);
+        v[..unknown].copy_from_slice(&u[..unknown]);
+        let first = at.problem.robot().root().nv();
+        for (&joint, rate) in self.joints.iter().zip(&*x) {
+            v[first + joint] = *rate;
+        }
+        Quality {
+            dependent: !independent,
+            missed_squared: missed * missed,
+        }
+    }
+}
+
+impl RootChain {
+    pub(super) fn unknowns(self) -> usize {
+        match self {
+            Self::Known => 0,
+            Self::Free => 6,
+        }
+    }
+}
+
+/// Everything rows are made of.
+pub(super) struct Closing<'a> {
+    pub(super) problem: &'a Problem,
+    pub(super) q: &'a [f64],
+    pub(super) page: &'a Page,
+    pub(super) instant: &'a Instant<'a>,
+}
+
+impl Closing<'_> {
+    /// Twist of the root that a pose task of one of its frames imposes: `linear` is the velocity of the root's origin.
+    fn root_twist(&self, task: usize) -> Screw {
+        let robot = self.problem.robot();
+        let imposed = self.instant.twist(self.problem, task, self.page);
+        let Track::Pose(frame) = self.problem.tasks()[task].track else {
+            unreachable!("only a pose imposes the root");
+        };
+        let point = self.page.frame_position(robot, frame);
+        let origin = Vector3::from_column_slice(&self.q[..3]);
+        Screw {
+            angular: imposed.angular,
+            linear: imposed.linear + imposed.angular.cross(&(origin - point)),
+        }
+    }
+
+    /// Adds the rows `[root | joints | imposed]` of circuits to `rows`, which are zero.
+    fn fill(
+        &self,
+        circuits: &[Circuit],
+        chain: RootChain,
+        root: &Screw,
+        place: &[usize],
+        rows: &mut [f64],
+        joints: usize,
+    ) {
+        let unknown = chain.unknowns();
+        let width = unknown + joints + 1;
+        let mut begin = 0;
+        for circuit in circuits {
+            let rows = &mut rows[begin * width..(begin + circuit.rows) * width];
+            let block = Block { rows, width, unknown };
+            self.fill_circuit(circuit, chain, root, place, block);
+            if let Some(weights) = &circuit.weights {
+                weights.multiply_rows(rows, width);
+            }
+            begin += circuit.rows;
+        }
+    }
+
+    fn fill_circuit(
+        &self,
+        circuit: &Circuit,
+        chain: RootChain,
+        root: &Screw,
+        place: &[usize],
+        mut block: Block<'_>,
+    ) {
+        let (problem, page) = (self.problem, self.page);
+        let robot = problem.robot();
+        let track = problem.tasks()[circuit.task].track;
+        let (frame, linear, angular) = match track {
+            Track::Position(f) => (f, Some(0), None),
+            Track::Orientation(f) => (f, None, Some(0)),
+            Track::Pose(f) => (f, Some(0), Some(3)),
+            Track::CentreOfMass => return self.fill_mass(circuit, chain, root, place, block),
+            Track::Posture => return self.fill_posture(circuit, place, block),
+        };
+        let point = page.frame_position(robot, frame);
+        let mut imposed = self.instant.twist(problem, circuit.task, page);
+        match (chain, robot.root()) {
+            (RootChain::Free, _) => {
+                for (k, screw) in root_screws(robot, page, &point).iter().enumerate() {
+                    block.add(k, screw, linear, angular);
+                }
+            }
+            (RootChain::Known, Root::Floating) => {
+                let carried = root.at(&(point - Vector3::from_column_slice(&self.q[..3])));
+                imposed.linear -= carried.linear;
+                imposed.angular -= carried.angular;
+            }
+            (RootChain::Known, Root::Fixed) => {}
+        }
+        let (unknown, first) = (block.unknown, robot.root().nv());
+        for_each_screw(robot, page, robot.frames()[frame.0].body, &point, |v, screw| {
+            block.add(unknown + place[v - first], screw, linear, angular);
+        });
+        let imposed = Screw {
+            angular: imposed.angular,
+            linear: imposed.linear,
+        };
+        block.add(block.width - 1, &imposed, linear, angular);
+    }
+
+    fn fill_mass(
+        &self,
+        circuit: &Circuit,
+        chain: RootChain,
+        root: &Screw,
+        place: &[usize],
+        mut block: Block<'_>,
+    ) {
+        let robot = self.problem.robot();
+        let first = robot.root().nv();
+        let mut imposed = self.instant.twist(self.problem, circuit.task, self.page).linear;
+        for v in 0..first {
+            let column = self.page.centre_of_mass_column(v);
+            match chain {
+                RootChain::Free => block.add3(v, &column, 0),
+                RootChain::Known => {
+                    let rate = if v < 3 {
+                        root.linear[v]
+                    } else {
+                        root.angular[v - 3]
+                    };
+                    imposed -= column * rate;
+                }
+            }
+        }
+        for (joint, &local) in place.iter().enumerate() {
+            block.add3(
+                block.unknown + local,
+                &self.page.centre_of_mass_column(first + joint),
+                0,
+            );
+        }
+        block.add3(block.width - 1, &imposed, 0);
+    }
+
+    fn fill_posture(&self, circuit: &Circuit, place: &[usize], block: Block<'_>) {
+        let slot = self.problem.slots()[circuit.task];
+        let joints = &self.q[self.problem.robot().root().nq()..];
+        let range = circuit.joint.map_or(0..circuit.rows, |j| j..j + 1);
+        for (row, j) in range.enumerate() {
+            let row = &mut block.rows[row * block.width..(row + 1) * block.width];
+            row[block.unknown + place[j]] = 1.0;
+            row[block.width - 1] = self.instant.joint_rate(slot, j, joints[j]);
+        }
+    }
+}
+
+/// Rows of one circuit within a stage.
+struct Block<'a> {
+    rows: &'a mut [f64],
+    width: usize,
+    unknown: usize,
+}
+
+impl Block<'_> {
+    /// Adds a screw to a column; the linear and the angular part begin at these rows, if they are imposed.
+    #[inline]
+    fn add(&mut self, column: usize, screw: &Screw, linear: Option<usize>, angular: Option<usize>) {
+        if let Some(row) = linear {
+            self.add3(column, &screw.linear, row);
+        }
+        if let Some(row) = angular {
+            self.add3(column, &screw.angular, row);
+        }
+    }
+
+    #[inline]
+    fn add3(&mut self, column: usize, value: &Vector3<f64>, row: usize) {
+        for k in 0..3 {
+            self.rows[(row + k) * self.width + column] += value[k];
+        }
+    }
+}

@@ -1,0 +1,511 @@
+//! Least squares of least norm by orthogonal factorisation, in stages of priority.
+//!
+//! A stage holds rows `F u + C x = y`: the unknowns u are free (they cost nothing), the unknowns x cost their length. It
+//! answers
+//! ```text
+//! minimise ‖F u + C x − y‖² + λ² ‖x‖²   over u, x;   with λ = 0 the shortest x among the least squares
+//! ```
+//! in two orthogonal factorisations. Householder reflections from the left make F upper triangular; the rows below no
+//! longer contain u, they are the left null space of F times the rows (Campos, Guenther & Martins 2005 call it the
+//! elimination of the columns that are not wanted). Householder reflections from the right make what is left of C lower
+//! triangular, `C Q = [L 0]`, rows pivoted by length: `x = Q [w; z]` with `L w = y`, and z is what the stage leaves
+//! free. The next stage of priority ([`Stage::follow`]) is written in z and the u that are left, and so cannot disturb
+//! this one.
+//!
+//! Rows are stored `[F | C | y]`, one after the other.
+
+/// A pivot below this part of the largest one counts as zero: the rows are dependent. With unit axes and limbs of some
+/// decimetres, a twist of 1 mm/s would ask for some 1e3 rad/s there; no finite difference of the method sees that far.
+pub(super) const DEPENDENT: f64 = 1e-6;
+/// Columns of F below this part of the largest one count as dependent on the others: rounding of some hundred operations.
+const FREE_DEPENDENT: f64 = 1e-12;
+
+/// Rows of one priority and their factorisation. Sized once; nothing here allocates afterwards.
+#[derive(Clone, Debug)]
+pub(super) struct Stage {
+    free: usize,
+    costed: usize,
+    width: usize,
+    height: usize,
+    rows: Vec<f64>,
+    /// Column of F that stands at each place after pivoting.
+    order: Vec<usize>,
+    /// Rank of F.
+    free_rank: usize,
+    /// Rank of C below F.
+    rank: usize,
+    /// Reflection k from the right is `1 − scale[k] v vᵀ`, v at `reflections[k * costed..]`.
+    reflections: Vec<f64>,
+    scale: Vec<f64>,
+    /// The part of x that the stage decides, in the coordinates of Q.
+    decided: Vec<f64>,
+    /// A row's worth of sums.
+    sums: Vec<f64>,
+    /// The small least-squares problem `[L; λ 1] w = [y; 0]`.
+    small: Vec<f64>,
+}
+
+impl Stage {
+    /// Room for `height` rows in `free` free and `costed` costed unknowns.
+    pub(super) fn new(height: usize, free: usize, costed: usize) -> Self {
+        let width = free + costed + 1;
+        let most = height.min(costed);
+        Self {
+            free,
+            costed,
+            width,
+            height,
+            rows: vec![0.0; height * width],
+            order: (0..free).collect(),
+            free_rank: 0,
+            rank: 0,
+            reflections: vec![0.0; most * costed],
+            scale: vec![0.0; most],
+            decided: vec![0.0; most],
+            sums: vec![0.0; width],
+            small: vec![0.0; (height + most) * (most + 1)],
+        }
+    }
+
+    /// Numbers of one row: free, costed, right-hand side.
+    pub(super) fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Zeroes the rows and hands them out to be filled, `[F | C | y]` each. The sizes are those of [`Stage::new`] again.
+    pub(super) fn clear(&mut self, free: usize, costed: usize) -> &mut [f64] {
+        (self.free, self.costed, self.width) = (free, costed, free + costed + 1);
+        let rows = &mut self.rows[..self.height * self.width];
+        rows.fill(0.0);
+        rows
+    }
+
+    /// The rows as they are.
+    pub(super) fn rows(&self) -> &[f64] {
+        &self.rows[..self.height * self.width]
+    }
+
+    /// Factorises both parts. True if C has full rank below F.
+    pub(super) fn factorise(&mut self) -> bool {
+        self.eliminate_free();
+        self.triangulate();
+        self.rank == (self.height - self.free_rank).min(self.costed)
+    }
+
+    /// F upper triangular by reflections from the left, columns pivoted by length.
+    fn eliminate_free(&mut self) {
+        for (place, column) in self.order[..self.free].iter_mut().enumerate() {
+            *column = place;
+        }
+        self.free_rank = 0;
+        let (w, mut first) = (self.width, 0.0);
+        for k in 0..self.free.min(self.height) {
+            let length = |c: usize| {
+                self.rows[k * w..]
+                    .iter()
+                    .skip(c)
+                    .step_by(w)
+                    .map(|x| x * x)
+                    .sum::<f64>()
+            };
+            let (best, square) = (k..self.free)
+                .map(|c| (c, length(c)))
+                .fold((k, -1.0), |best, next| if next.1 > best.1 { next } else { best });
+            let norm = square.sqrt();
+            first = f64::max(first, norm);
+            if norm <= FREE_DEPENDENT * first {
+                break;
+            }
+            self.order.swap(k, best);
+            for row in self.rows[..self.height * w].chunks_exact_mut(w) {
+                row.swap(k, best);
+            }
+            self.reflect_rows(k, norm);
+            self.free_rank += 1;
+        }
+    }
+
+    /// Reflects rows k … so that column k has `norm` (up to sign) in row k and zeros below.
+    fn reflect_rows(&mut self, k: usize, norm: f64) {
+        let (w, h) = (self.width, self.height);
+        let rows = &mut self.rows[k * w..h * w];
+        let head = rows[k];
+        let pivot = -norm.copysign(head);
+        // The reflector is column k with `head − pivot` at its head; it stays there until it has been applied.
+        rows[k] = head - pivot;
+        let scale = 1.0 / (norm * (norm + head.abs()));
+        let sums = &mut self.sums[k + 1..w];
+        sums.fill(0.0);
+        for row in rows.chunks_exact(w) {
+            let v = row[k];
+            sums.iter_mut().zip(&row[k + 1..]).for_each(|(s, x)| *s += v * x);
+        }
+        for row in rows.chunks_exact_mut(w) {
+            let v = scale * row[k];
+            row[k] = 0.0;
+            row[k + 1..].iter_mut().zip(&*sums).for_each(|(x, s)| *x -= v * s);
+        }
+        rows[k] = pivot;
+    }
+
+    /// C below F lower triangular by reflections from the right, rows pivoted by length.
+    fn triangulate(&mut self) {
+        let (f, n, w) = (self.free, self.costed, self.width);
+        self.rank = 0;
+        let below = &mut self.rows[self.free_rank * w..self.height * w];
+        let mut first = 0.0;
+        for k in 0..n.min(below.len() / w) {
+            let length = |row: &[f64]| row[f + k..f + n].iter().map(|x| x * x).sum::<f64>();
+            let (best, square) = below
+                .chunks_exact(w)
+                .enumerate()
+                .skip(k)
+                .map(|(i, row)| (i, length(row)))
+                .fold((k, -1.0), |best, next| if next.1 > best.1 { next } else { best });
+            let norm = square.sqrt();
+            first = f64::max(first, norm);
+            if norm <= DEPENDENT * first {
+                break;
+            }
+            swap_rows(below, w, k, best);
+            let (done, rest) = below.split_at_mut((k + 1) * w);
+            let row = &mut done[k * w + f + k..k * w + f + n];
+            let pivot = -norm.copysign(row[0]);
+            let v = &mut self.reflections[k * n + k..(k + 1) * n];
+            v.copy_from_slice(row);
+            v[0] -= pivot;
+            self.scale[k] = 1.0 / (norm * (norm + row[0].abs()));
+            row.fill(0.0);
+            row[0] = pivot;
+            for row in rest.chunks_exact_mut(w) {
+                reflect(v, self.scale[k], &mut row[f + k..f + n]);
+            }
+            self.rank += 1;
+        }
+    }
+
+    /// Decides what the stage decides, damped by λ; returns the Euclidean norm of what its rows then miss.
+    pub(super) fn decide(&mut self, damping: f64) -> f64 {
+        let (f, n, w, r) = (self.free, self.costed, self.width, self.rank);
+        let below = &self.rows[self.free_rank * w..self.height * w];
+        if damping == 0.0 && below.len() / w == r {
+            for i in 0..r {
+                let row = &below[i * w..(i + 1) * w];
+                let known: f64 = row[f..f + i].iter().zip(&self.decided).map(|(l, x)| l * x).sum();
+                self.decided[i] = (row[f + n] - known) / row[f + i];
+            }
+            return 0.0;
+        }
+        self.decide_by_least_squares(damping);
+        let below = self.rows[self.free_rank * w..self.height * w].chunks_exact(w);
+        let missed = below.map(|row| {
+            let made: f64 = row[f..f + r].iter().zip(&self.decided).map(|(l, x)| l * x).sum();
+            (made - row[f + n]).powi(2)
+        });
+        missed.sum::<f64>().sqrt()
+    }
+
+    /// `minimise ‖L w − y‖² + λ² ‖w‖²` by reflections of `[L y; λ1 0]` from the left.
+    fn decide_by_least_squares(&mut self, damping: f64) {
+        let (f, n, w, r) = (self.free, self.costed, self.width, self.rank);
+        let below = &self.rows[self.free_rank * w..self.height * w];
+        let (height, width) = (below.len() / w + r, r + 1);
+        let small = &mut self.small[..height * width];
+        small.fill(0.0);
+        for (to, row) in small.chunks_exact_mut(width).zip(below.chunks_exact(w)) {
+            to[..r].copy_from_slice(&row[f..f + r]);
+            to[r] = row[f + n];
+        }
+        for k in 0..r {
+            small[(height - r + k) * width + k] = damping;
+        }
+        for k in 0..r {
+            let square: f64 = small[k * width + k..].iter().step_by(width).map(|x| x * x).sum();
+            let (norm, head) = (square.sqrt(), small[k * width + k]);
+            let pivot = -norm.copysign(head);
+            let scale = 1.0 / (norm * (norm + head.abs()));
+            small[k * width + k] -= pivot;
+            for c in k + 1..width {
+                let mut sum = 0.0;
+                for row in small[k * width..].chunks_exact(width) {
+                    sum += row[k] * row[c];
+                }
+                for row in small[k * width..].chunks_exact_mut(width) {
+                    row[c] -= scale * sum * row[k];
+                }
+            }
+            small[k * width + k] = pivot;
+        }
+        for k in (0..r).rev() {
+            let row = &small[k * width..(k + 1) * width];
+            let known: f64 = row[k + 1..r]
+                .iter()
+                .zip(&self.decided[k + 1..])
+                .map(|(a, x)| a * x)
+                .sum();
+            self.decided[k] = (row[r] - known) / row[k];
+        }
+    }
+
+    /// Unknowns that this stage leaves: free ones, costed ones.
+    pub(super) fn left(&self) -> (usize, usize) {
+        (self.free - self.free_rank, self.costed - self.rank)
+    }
+
+    /// Writes rows of the next priority, given in the unknowns of this stage (`[F | C | y]`, this stage's width), into
+    /// `next` in the unknowns this stage leaves. The given rows are used up.
+    pub(super) fn follow(&self, rows: &mut [f64], next: &mut Self) {
+        let (f, n, w, r) = (self.free, self.costed, self.width, self.rank);
+        let (free, costed) = self.left();
+        let to = next.clear(free, costed);
+        for (row, to) in rows
+            .chunks_exact_mut(w)
+            .zip(to.chunks_exact_mut(free + costed + 1))
+        {
+            self.sort_free(row);
+            for k in 0..self.free_rank {
+                let top = &self.rows[k * w..(k + 1) * w];
+                let factor = row[k] / top[k];
+                row[k..]
+                    .iter_mut()
+                    .zip(&top[k..])
+                    .for_each(|(x, t)| *x -= factor * t);
+            }
+            for k in 0..r {
+                let v = &self.reflections[k * n + k..(k + 1) * n];
+                reflect(v, self.scale[k], &mut row[f + k..f + n]);
+            }
+            let made: f64 = row[f..f + r].iter().zip(&self.decided).map(|(c, x)| c * x).sum();
+            to[..free].copy_from_slice(&row[self.free_rank..f]);
+            to[free..free + costed].copy_from_slice(&row[f + r..f + n]);
+            to[free + costed] = row[f + n] - made;
+        }
+    }
+
+    /// Brings the free part of a row into the pivoted order.
+    fn sort_free(&self, row: &mut [f64]) {
+        let mut sorted = [0.0; MOST_FREE];
+        for (s, &column) in sorted.iter_mut().zip(&self.order[..self.free]) {
+            *s = row[column];
+        }
+        row[..self.free].copy_from_slice(&sorted[..self.free]);
+    }
+
+    /// Writes u and x; on entry they hold, in front, what the stages after this one decided of what it left.
+    pub(super) fn finish(&self, u: &mut [f64], x: &mut [f64]) {
+        let (f, n, w, r) = (self.free, self.costed, self.width, self.rank);
+        x.copy_within(..n - r, r);
+        x[..r].copy_from_slice(&self.decided[..r]);
+        for k in (0..r).rev() {
+            let v = &self.reflections[k * n + k..(k + 1) * n];
+            reflect(v, self.scale[k], &mut x[k..n]);
+        }
+        let mut pivoted = [0.0; MOST_FREE];
+        pivoted[self.free_rank..f].copy_from_slice(&u[..f - self.free_rank]);
+        for k in (0..self.free_rank).rev() {
+            let row = &self.rows[k * w..(k + 1) * w];
+            let costed: f64 = row[f..f + n].iter().zip(&x[..n]).map(|(c, x)| c * x).sum();
+            let known: f64 = row[k + 1..f]
+                .iter()
+                .zip(&pivoted[k + 1..])
+                .map(|(c, u)| c * u)
+                .sum();
+            pivoted[k] = (row[f + n] - costed - known) / row[k];
+        }
+        for (&column, value) in self.order[..f].iter().zip(pivoted) {
+            u[column] = value;
+        }
+    }
+}
+
+/// Free unknowns there can be: the six of a root.
+pub(super) const MOST_FREE: usize = 6;
+
+/// `row ← row (1 − s v vᵀ)`.
+#[inline]
+fn reflect(v: &[f64], scale: f64, row: &mut [f64]) {
+    let sum = scale * v.iter().zip(&*row).map(|(v, x)| v * x).sum::<f64>();
+    row.iter_mut().zip(v).for_each(|(x, v)| *x -= sum * v);
+}
+
+fn swap_rows(rows: &mut [f64], width: usize, a: usize, b: usize) {
+    if a != b {
+        let (head, tail) = rows.split_at_mut(a.max(b) * width);
+        head[a.min(b) * width..][..width].swap_with_slice(&mut tail[..width]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+
+    /// Numbers in ±1 from a seed (SplitMix64).
+    fn numbers(seed: u64, count: usize) -> Vec<f64> {
+        let mut state = seed;
+        let mut next = || {
+            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mut z = state;
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        (0..count).map(|_| next()).collect()
+    }
+
+    struct Case {
+        f: DMatrix<f64>,
+        c: DMatrix<f64>,
+        y: DVector<f64>,
+    }
+
+    fn case(seed: u64, m: usize, f: usize, n: usize) -> Case {
+        Case {
+            f: DMatrix::from_row_slice(m, f, &numbers(seed, m * f)),
+            c: DMatrix::from_row_slice(m, n, &numbers(seed + 1000, m * n)),
+            y: DVector::from_vec(numbers(seed + 2000, m)),
+        }
+    }
+
+    fn rows(case: &Case) -> Vec<f64> {
+        let row = |i: usize| {
+            let (f, c) = (case.f.row(i), case.c.row(i));
+            f.iter()
+                .chain(c.iter())
+                .copied()
+                .chain([case.y[i]])
+                .collect::<Vec<_>>()
+        };
+        (0..case.y.len()).flat_map(row).collect()
+    }
+
+    fn stage(case: &Case) -> Stage {
+        let (m, f, n) = (case.y.len(), case.f.ncols(), case.c.ncols());
+        let mut stage = Stage::new(m, f, n);
+        stage.clear(f, n).copy_from_slice(&rows(case));
+        stage
+    }
+
+    fn answer(stage: &Stage, f: usize, n: usize) -> (DVector<f64>, DVector<f64>) {
+        let (mut u, mut x) = (vec![0.0; f], vec![0.0; n]);
+        stage.finish(&mut u, &mut x);
+        (DVector::from_vec(u), DVector::from_vec(x))
+    }
+
+    /// Oracle: W of the left null space of F by SVD, then the damped pseudo-inverse of W C.
+    fn oracle(case: &Case, damping: f64) -> DVector<f64> {
+        let (m, f) = (case.y.len(), case.f.ncols());
+        let full = DMatrix::from_fn(m, m.max(f), |i, j| if j < f { case.f[(i, j)] } else { 0.0 });
+        let svd = full.svd(true, false);
+        let (u, s) = (svd.u.unwrap(), svd.singular_values);
+        let null: Vec<usize> = (0..m).filter(|&i| s[i] < 1e-10).collect();
+        if null.is_empty() {
+            return DVector::zeros(case.c.ncols());
+        }
+        let w = DMatrix::from_fn(null.len(), m, |i, j| u[(j, null[i])]);
+        let (a, y) = (&w * &case.c, &w * &case.y);
+        let svd = a.svd(true, true);
+        let (u, s, vt) = (svd.u.unwrap(), svd.singular_values, svd.v_t.unwrap());
+        let filtered = (u.transpose() * y).zip_map(&s, |y, s| {
+            if s > 1e-9 {
+                y * s / (s * s + damping * damping)
+            } else {
+                0.0
+            }
+        });
+        vt.transpose() * filtered
+    }
+
+    #[test]
+    fn square_redundant_overdetermined_and_damped_stages_agree_with_singular_values() {
+        for seed in 0..40 {
+            for (m, f, n) in [
+                (6, 0, 6),
+                (5, 0, 9),
+                (9, 0, 5),
+                (12, 6, 8),
+                (15, 6, 12),
+                (4, 6, 3),
+                (1, 0, 1),
+            ] {
+                for damping in [0.0, 1e-3, 0.3] {
+                    let case = case(seed, m, f, n);
+                    let mut stage = stage(&case);
+                    assert!(stage.factorise());
+                    stage.decide(damping);
+                    let (u, x) = answer(&stage, f, n);
+                    let expected = oracle(&case, damping);
+                    let scale = 1.0 + expected.amax();
+                    assert!(
+                        (&x - &expected).amax() < 1e-9 * scale,
+                        "{seed} {m} {f} {n} {damping}"
+                    );
+                    // With x given, u is the least-squares solution.
+                    let residual = &case.f * u + &case.c * x - &case.y;
+                    assert!(case.f.tr_mul(&residual).amax() < 1e-9 * scale);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn dependent_rows_are_noticed_and_solved_in_the_least_squares_sense() {
+        for seed in 0..20 {
+            let mut case = case(seed, 5, 0, 7);
+            let copy = case.c.row(1) * 2.0;
+            case.c.row_mut(4).copy_from(&copy);
+            let mut stage = stage(&case);
+            assert!(!stage.factorise());
+            let missed = stage.decide(0.0);
+            let (_, x) = answer(&stage, 0, 7);
+            assert!((&x - oracle(&case, 0.0)).amax() < 1e-8);
+            assert!(((&case.c * x - &case.y).norm() - missed).abs() < 1e-10);
+        }
+    }
+
+    #[test]
+    fn a_second_stage_does_not_disturb_the_first_and_is_best_among_what_is_left() {
+        for seed in 0..20 {
+            for (hard, soft) in [((9, 6, 8), 3), ((4, 6, 8), 5), ((6, 0, 10), 6), ((0, 6, 5), 8)] {
+                let (m, f, n) = hard;
+                let (first, second) = (case(seed, m, f, n), case(seed + 77, soft, f, n));
+                let mut a = stage(&first);
+                a.factorise();
+                a.decide(0.0);
+                let mut b = Stage::new(soft, f, n);
+                a.follow(&mut rows(&second), &mut b);
+                b.factorise();
+                let missed = b.decide(0.0);
+                let (mut u, mut x) = (vec![0.0; f], vec![0.0; n]);
+                b.finish(&mut u, &mut x);
+                a.finish(&mut u, &mut x);
+                let (u, x) = (DVector::from_vec(u), DVector::from_vec(x));
+                assert!((&first.f * &u + &first.c * &x - &first.y).amax() < 1e-9);
+                let residual = &second.f * &u + &second.c * &x - &second.y;
+                assert!((residual.norm() - missed).abs() < 1e-9, "{hard:?} {soft}");
+                // Optimal: the gradient is orthogonal to the null space of the first stage.
+                let joint = DMatrix::from_fn(m, f + n, |i, j| {
+                    if j < f {
+                        first.f[(i, j)]
+                    } else {
+                        first.c[(i, j - f)]
+                    }
+                });
+                let other = DMatrix::from_fn(soft, f + n, |i, j| {
+                    if j < f {
+                        second.f[(i, j)]
+                    } else {
+                        second.c[(i, j - f)]
+                    }
+                });
+                let gradient = other.tr_mul(&residual);
+                let identity = DMatrix::identity(f + n, f + n);
+                let projector = match m {
+                    0 => identity,
+                    _ => identity - joint.clone().pseudo_inverse(1e-10).unwrap() * &joint,
+                };
+                assert!((projector * gradient).amax() < 1e-8, "{hard:?} {soft}");
+            }
+        }
+    }
+}

@@ -1,0 +1,477 @@
+//! # Davies' network method
+//!
+//! The robot and the virtual chains that impose its tasks are one closed mechanism; Davies' circulation law, the Kirchhoff
+//! law of twists, relates all joint rates at once. One description whichever foot stands, no support switching, no
+//! end-effector Jacobians. Exact where tasks and mobility match; it knows neither limits nor priorities by itself.
+//!
+//! ## Problem solved
+//! ```text
+//! N q̇ = 0,  columns [root chain | real joints | task chains]       one circuit per task, 6 rows (centre of mass 3)
+//! N_s q̇_s = −N_p q̇_p,   q̇_p imposed virtual coordinates,   q̇_s real joints, monitored coordinates, a free root
+//! ```
+//! ## Step
+//! (S1) Measure the virtual coordinates m at q⁻ by forward kinematics. (S2) `q̇_p = ẋ + K (x − m)` with the targets x of
+//! the beginning of the step, ẋ their forward difference (`rates = "difference"`) or the given rates (`"analytic"`).
+//! (S3) Eliminate monitored coordinates and a free root by the left null space of their columns, which leaves `A q̇ = y` in
+//! the real joints: square, the solution; fewer rows, the least joint rates; damped where asked for. (S4) Rates of the
+//! root from what was eliminated. (S5) q = q⁻ ⊕ Δt q̇, or the classical Runge-Kutta rule with rows and targets inside the
+//! step, on SO(3) in the manner of Munthe-Kaas.
+//!
+//! The default `correction` K Δt = 1 is full correction; then q̇_p = (x⁺ − m)/Δt, the form of closed-loop inverse
+//! kinematics. 0 is the open loop, which drifts.
+//!
+//! ## What it needs
+//! Targets; their rates if `rates = "analytic"`. A hard pose of a frame on the root link imposes the root; otherwise the
+//! root is free and follows. Hard tasks must not impose more than the mobility, as a whole or on any limb.
+//!
+//! ## Known limits
+//! No boundary. Straight knees and elbows: the circuits lose rank there, rates grow without bound towards them, and an
+//! exactly straight leg does not bend. Dependent rows are damped with `singular_damping` and the step says so.
+//!
+//! ## Source
+//! Method: Davies (1981), Mechanical networks, Mech. Mach. Theory 16; Assur virtual chains: Campos, Guenther & Martins
+//! (2005). Humanoid: the Bioloid paper of `docs/davies.md`, eqs. (1)-(9), (15).
+//!
+//! ## Deviations
+//! Deviation: compromised tasks. The network knows no slack. Their circuits are solved after the hard ones, by damped
+//! least squares (`soft_damping`) in the motions those leave; weights act on world axes.
+//! Deviation: `orientation = "angular-velocity"` by default. The paper's Euler rates impose the same motion but their
+//! chain is singular at ±90 degrees.
+//! Deviation: the circuit of the centre of mass is ours (see `virtual_chain`).
+//! Deviation: least norm is over real joints only. Over all secondary columns it would shorten the rates of root and
+//! monitored coordinates too, which are no effort.
+
+mod circuits;
+mod least_norm;
+mod mechanism;
+mod network;
+mod virtual_chain;
+
+pub use mechanism::{LinkKind, Mechanism, MechanismCircuit, MechanismJoint, MechanismLink, Role};
+pub use network::{Network, ReferencePoint};
+
+use crate::registry::{Allowed, Field, Method, MethodInfo, Parameters, Preset};
+use crate::step_qp::stay;
+use circuits::{Circuits, Closing, Damping};
+use ik_core::configuration::integrate_into;
+use ik_core::evaluator::Evaluator;
+use ik_core::formulation::{
+    Declined, Formulation, Honours, Prepared, Solution, Stepper, Termination, Trust, Use,
+};
+use ik_core::kinematics::{Page, forward};
+use ik_core::problem::Problem;
+use ik_core::robot::Root;
+use ik_core::spatial::so3;
+use ik_core::step::{ControlStep, Window};
+use nalgebra::{DMatrix, Vector3};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use virtual_chain::Instant;
+
+/// How targets move between the samples of a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Between {
+    /// On a line: rates are forward differences.
+    #[default]
+    #[serde(rename = "difference")]
+    Line,
+    /// On the cubic through both samples with their given rates.
+    #[serde(rename = "analytic")]
+    Hermite,
+}
+
+/// What the revolute coordinates of a virtual chain are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum OrientationRates {
+    /// World angular velocity: three axes e_x, e_y, e_z through the point.
+    #[default]
+    #[serde(rename = "angular-velocity")]
+    AngularVelocity,
+    /// Rates of the angles of `Rx Ry Rz`, the paper's chain.
+    #[serde(rename = "euler-rates")]
+    Euler,
+}
+
+/// How rates become positions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Integrator {
+    /// One evaluation per step.
+    #[default]
+    Euler,
+    /// The classical Runge-Kutta rule: four evaluations per step.
+    Rk4,
+}
+
+impl Integrator {
+    /// Nodes τ, weights of the previous rate in the node's increment, weights in the result.
+    fn stages(self) -> &'static [(f64, f64, f64)] {
+        match self {
+            Self::Euler => &[(0.0, 0.0, 1.0)],
+            Self::Rk4 => &[
+                (0.0, 0.0, 1.0 / 6.0),
+                (0.5, 0.5, 1.0 / 3.0),
+                (0.5, 0.5, 1.0 / 3.0),
+                (1.0, 1.0, 1.0 / 6.0),
+            ],
+        }
+    }
+}
+
+/// Parameters of [`Davies`].
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DaviesParameters {
+    /// K Δt.
+    pub correction: f64,
+    /// Where the rates of the targets come from.
+    pub rates: Between,
+    /// Revolute coordinates of the virtual chains.
+    pub orientation: OrientationRates,
+    /// Integration rule.
+    pub integrator: Integrator,
+    /// λ of hard rows.
+    pub damping: f64,
+    /// λ of compromised rows.
+    pub soft_damping: f64,
+    /// Least λ of hard rows that are dependent.
+    pub singular_damping: f64,
+}
+
+impl Default for DaviesParameters {
+    fn default() -> Self {
+        Self {
+            correction: 1.0,
+            rates: Between::Line,
+            orientation: OrientationRates::AngularVelocity,
+            integrator: Integrator::Euler,
+            damping: 0.0,
+            soft_damping: 1e-4,
+            singular_damping: 1e-2,
+        }
+    }
+}
+
+const DAMPING: Allowed = Allowed::Number {
+    least: 0.0,
+    largest: 1e3,
+};
+
+impl Parameters for DaviesParameters {
+    const HELP: &'static [Field] = &[
+        Field {
+            key: "correction",
+            unit: "-",
+            meaning: "K dt: part of the closure error removed per step; 0 is the open loop, stable below 2",
+            allowed: Allowed::Number {
+                least: 0.0,
+                largest: 1.999,
+            },
+        },
+        Field {
+            key: "rates",
+            unit: "-",
+            meaning: "target rates: forward differences, or the given ones with a cubic between the samples",
+            allowed: Allowed::Words(&["difference", "analytic"]),
+        },
+        Field {
+            key: "orientation",
+            unit: "-",
+            meaning: "revolute coordinates of the virtual chains",
+            allowed: Allowed::Words(&["angular-velocity", "euler-rates"]),
+        },
+        Field {
+            key: "integrator",
+            unit: "-",
+            meaning: "integration rule",
+            allowed: Allowed::Words(&["euler", "rk4"]),
+        },
+        Field {
+            key: "damping",
+            unit: "m, rad",
+            meaning: "lambda of the hard rows",
+            allowed: DAMPING,
+        },
+        Field {
+            key: "soft_damping",
+            unit: "m, rad",
+            meaning: "lambda of the compromised rows",
+            allowed: DAMPING,
+        },
+        Field {
+            key: "singular_damping",
+            unit: "m, rad",
+            meaning: "least lambda of hard rows that are dependent",
+            allowed: Allowed::Number {
+                least: 1e-6,
+                largest: 1e3,
+            },
+        },
+    ];
+}
+
+/// Davies' method.
+#[derive(Clone, Debug)]
+pub struct Davies {
+    parameters: DaviesParameters,
+}
+
+impl Method for Davies {
+    type Parameters = DaviesParameters;
+    const INFO: MethodInfo = MethodInfo {
+        id: "davies",
+        name: "Davies' network method",
+        summary: "circulation law over virtual chains, one step with full closure correction, no boundary",
+        source: "Davies (1981); Campos, Guenther & Martins (2005); Bioloid paper, eqs. (1)-(9)",
+    };
+    fn new(parameters: Self::Parameters) -> Self {
+        Self { parameters }
+    }
+}
+
+/// The open loop: rates are integrated, nothing is corrected.
+pub const OPEN_LOOP: Preset = Preset {
+    info: MethodInfo {
+        id: "davies-open",
+        name: "Davies' network method, open loop",
+        summary: "the same without closure correction: shows the drift of integrated rates",
+        source: "Davies (1981); Campos, Guenther & Martins (2005); Bioloid paper, eqs. (1)-(9)",
+    },
+    values: &[("correction", 0.0)],
+};
+
+impl Formulation for Davies {
+    fn prepare(&self, problem: &Arc<Problem>) -> Result<Prepared, Declined> {
+        if self.parameters.rates == Between::Hermite && !problem.supplies().rates {
+            return Err(Declined::Information {
+                needs: "target rates (parameter rates = \"analytic\")".to_owned(),
+            });
+        }
+        let robot = problem.robot();
+        let (mut phases, mut notes) = (Vec::new(), Vec::new());
+        for phase in problem.phases() {
+            let mut circuits = Circuits::new(problem, phase);
+            if let Some(note) = check_mobility(problem, &mut circuits)? {
+                notes.push(format!("phase `{}`: {note}", phase.name));
+            }
+            phases.push(circuits);
+        }
+        let stepper = DaviesStepper {
+            problem: Arc::clone(problem),
+            parameters: self.parameters.clone(),
+            phases,
+            page: Page::new(robot),
+            q: vec![0.0; robot.nq()],
+            v: vec![0.0; robot.nv()],
+            increment: vec![0.0; robot.nv()],
+            dq: vec![0.0; robot.nv()],
+        };
+        let honours = Honours {
+            boundary: false,
+            hard_rows: false,
+            objective: Use::Ignored,
+            allocation_free: true,
+            counts: Trust::Metered,
+        };
+        #[allow(clippy::cast_possible_truncation, reason = "one or four")]
+        Ok(Prepared {
+            stepper: Box::new(stepper),
+            majors: self.parameters.integrator.stages().len() as u32,
+            honours,
+            notes,
+        })
+    }
+}
+
+#[derive(Debug)]
+struct DaviesStepper {
+    problem: Arc<Problem>,
+    parameters: DaviesParameters,
+    phases: Vec<Circuits>,
+    page: Page,
+    q: Vec<f64>,
+    v: Vec<f64>,
+    /// Increment from q⁻ to the configuration of the next evaluation.
+    increment: Vec<f64>,
+    dq: Vec<f64>,
+}
+
+impl Stepper for DaviesStepper {
+    fn step(&mut self, step: &ControlStep<'_>, eval: &mut Evaluator, out: &mut Solution) -> Termination {
+        stay(step, out);
+        self.v.fill(0.0);
+        self.dq.fill(0.0);
+        let (mut dependent, mut missed) = (false, 0.0);
+        for &(tau, previous, weight) in self.parameters.integrator.stages() {
+            if !eval.meter.next_major() {
+                return Termination::Budget;
+            }
+            for (d, v) in self.increment.iter_mut().zip(&self.v) {
+                *d = previous * step.dt_s * v;
+            }
+            let quality = self.rates(step, tau, eval);
+            dependent |= quality.dependent;
+            missed += weight * quality.missed_squared;
+            for (d, v) in self.dq.iter_mut().zip(&self.v) {
+                *d += weight * step.dt_s * v;
+            }
+        }
+        integrate_into(self.problem.robot(), step.q_prev, &self.dq, &mut out.q);
+        for (v, d) in out.v.iter_mut().zip(&self.dq) {
+            *v = d / step.dt_s;
+        }
+        if dependent {
+            let residual = f64::sqrt(missed) * step.dt_s;
+            return Termination::Damped { residual };
+        }
+        Termination::Stepped
+    }
+
+    fn reset(&mut self) {}
+}
+
+impl DaviesStepper {
+    /// Rates at q⁻ ⊕ increment and time τ, in `self.v`: those of the increment, should its rotation be finite.
+    fn rates(&mut self, step: &ControlStep<'_>, tau: f64, eval: &mut Evaluator) -> circuits::Quality {
+        let robot = self.problem.robot();
+        integrate_into(robot, step.q_prev, &self.increment, &mut self.q);
+        eval.pass(&self.q, &mut self.page);
+        let p = &self.parameters;
+        let instant = Instant {
+            targets: step.targets,
+            dt_s: step.dt_s,
+            tau,
+            correction: p.correction / step.dt_s,
+            between: p.rates,
+            rates: p.orientation,
+        };
+        let damping = Damping {
+            hard: p.damping,
+            soft: p.soft_damping,
+            singular: p.singular_damping,
+        };
+        let circuits = &mut self.phases[step.phase.0];
+        let quality = circuits.solve(&self.problem, &self.q, &self.page, &instant, damping, &mut self.v);
+        if robot.root() == Root::Floating && tau > 0.0 {
+            // log(exp(δ) exp(φ)) = φ + J_l⁻¹(φ) δ: the rate of the rotation vector φ of the increment.
+            let phi = Vector3::from_column_slice(&self.increment[3..6]);
+            let omega = Vector3::from_column_slice(&self.v[3..6]);
+            let rate = so3::left_jacobian_inverse(&phi) * omega;
+            self.v[3..6].copy_from_slice(rate.as_slice());
+        }
+        quality
+    }
+}
+
+/// Singular values below this part of the largest are zero where mobility is counted: at a generic posture independent
+/// rows of a robot stay above 1e-4, dependent ones are rounding.
+const RANK_TOLERANCE: f64 = 1e-9;
+/// Postures at which mobility is counted; the largest rank is the generic one.
+const GENERIC_POSTURES: usize = 3;
+
+/// Compares what hard tasks impose with what the mechanism, and each group of circuits in it, can do. A note if they leave
+/// freedom.
+fn check_mobility(problem: &Problem, circuits: &mut Circuits) -> Result<Option<String>, Declined> {
+    let robot = problem.robot();
+    let root = robot.root().nv();
+    let fixed = circuits.imposed_root.map_or(0, |_| 6);
+    let mobility = root + robot.coordinates().len();
+    let ranks: Vec<Ranked> = (0..circuits.groups.len())
+        .map(|g| generic_rank(problem, circuits, g))
+        .collect();
+    let imposed = fixed + ranks.iter().map(|r| r.imposed).sum::<usize>();
+    let rank = fixed + ranks.iter().map(|r| r.rank).sum::<usize>();
+    if imposed > mobility {
+        let root = circuits.imposed_root.map(|t| problem.tasks()[t].name.clone());
+        let tasks = root
+            .into_iter()
+            .chain(ranks.into_iter().flat_map(|r| r.tasks))
+            .collect();
+        return Err(Declined::Mobility {
+            imposed,
+            mobility,
+            rank,
+            tasks,
+        });
+    }
+    if let Some(worst) = ranks.into_iter().find(|r| r.rank < r.imposed) {
+        return Err(Declined::Mobility {
+            imposed: worst.imposed,
+            mobility: worst.mobility,
+            rank: worst.rank,
+            tasks: worst.tasks,
+        });
+    }
+    let spare = mobility - imposed;
+    Ok((spare > 0).then(|| {
+        format!(
+            "redundant: hard tasks impose {imposed} on a mobility of {mobility}; the other {spare} go to compromised \
+             tasks, then to the least joint rates"
+        )
+    }))
+}
+
+/// What the hard tasks of one group impose, and how many of those coordinates are independent.
+struct Ranked {
+    imposed: usize,
+    mobility: usize,
+    rank: usize,
+    tasks: Vec<String>,
+}
+
+fn generic_rank(problem: &Problem, circuits: &mut Circuits, g: usize) -> Ranked {
+    let robot = problem.robot();
+    let group = &circuits.groups[g];
+    let imposed = group.hard.iter().map(|c| c.rows).sum();
+    let unknown = group.joints.len() + group.root.unknowns();
+    let mut tasks: Vec<String> = group
+        .hard
+        .iter()
+        .map(|c| problem.tasks()[c.task].name.clone())
+        .collect();
+    tasks.dedup();
+    let rank = (0..GENERIC_POSTURES).map(|k| rank_at(problem, circuits, g, &generic_posture(robot, k)));
+    let rank = rank.max().unwrap_or(0);
+    Ranked {
+        imposed,
+        mobility: unknown,
+        rank,
+        tasks,
+    }
+}
+
+/// A posture without symmetry: multiples of the golden ratio, joints within ±1.
+fn generic_posture(robot: &ik_core::robot::Robot, k: usize) -> Vec<f64> {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    #[allow(clippy::cast_precision_loss, reason = "small counts")]
+    let number = |i: usize| 2.0 * ((1 + i + 97 * k) as f64 * GOLDEN).fract() - 1.0;
+    let dq: Vec<f64> = (0..robot.nv()).map(number).collect();
+    ik_core::configuration::integrate(robot, &robot.neutral(), &dq)
+}
+
+fn rank_at(problem: &Problem, circuits: &mut Circuits, g: usize, q: &[f64]) -> usize {
+    let mut page = Page::new(problem.robot());
+    forward(problem.robot(), q, &mut page);
+    let resting = vec![0.0; 2 * (problem.nx() + problem.nxdot())];
+    let instant = Instant {
+        targets: Window::new(&resting, problem.nx(), problem.nxdot()).expect("two whole samples"),
+        dt_s: 1.0,
+        tau: 0.0,
+        correction: 0.0,
+        between: Between::Line,
+        rates: OrientationRates::AngularVelocity,
+    };
+    let at = Closing {
+        problem,
+        q,
+        page: &page,
+        instant: &instant,
+    };
+    let (rows, width) = circuits.hard_rows(g, &at);
+    let matrix = DMatrix::from_row_slice(rows.len() / width, width, rows).remove_column(width - 1);
+    if matrix.is_empty() {
+        return 0;
+    }
+    let values = matrix.singular_values();
+    values.iter().filter(|&&s| s > RANK_TOLERANCE * values[0]).count()
+}

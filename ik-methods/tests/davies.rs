@@ -1,0 +1,538 @@
+//! Davies' method against the network matrix written out, against pseudo-inverses, and against its own counts.
+
+#![allow(clippy::unwrap_used, clippy::float_cmp, missing_docs, reason = "tests")]
+
+use ik_core::boundary::Boundary;
+use ik_core::configuration::integrate;
+use ik_core::driver::{Driver, StepInput};
+use ik_core::formulation::{Declined, Termination};
+use ik_core::kinematics::jacobian::{Axes, frame_jacobian};
+use ik_core::kinematics::{Page, forward};
+use ik_core::problem::{Kind, Phase, PhaseId, Problem, ProblemParts, Supplies};
+use ik_core::robot::{Robot, Root, UrdfOptions, embedded};
+use ik_core::spatial::so3;
+use ik_core::step::Window;
+use ik_core::task::{OrientationCoordinates, Priority, Task, Track, Weights};
+use ik_methods::davies::{Network, OrientationRates, ReferencePoint, Role};
+use ik_methods::registry::method;
+use nalgebra::{DMatrix, DVector, Matrix3, Quaternion, UnitQuaternion, Vector3};
+use std::sync::Arc;
+
+const WHOLE: PhaseId = PhaseId(0);
+
+fn soft() -> Priority {
+    Priority::Compromised(Weights::Uniform(1.0))
+}
+
+fn problem(robot: &Arc<Robot>, tasks: &[(&str, Track, Priority)]) -> Arc<Problem> {
+    let parts = ProblemParts {
+        robot: Arc::clone(robot),
+        tasks: tasks
+            .iter()
+            .map(|(name, track, _)| Task {
+                name: (*name).into(),
+                track: *track,
+            })
+            .collect(),
+        phases: vec![Phase {
+            name: "whole".into(),
+            tasks: tasks
+                .iter()
+                .enumerate()
+                .map(|(i, (_, _, p))| (i, p.clone()))
+                .collect(),
+        }],
+        boundary: Boundary::None,
+        objectives: vec![],
+        kind: Kind::Tracking,
+        supplies: Supplies {
+            rates: true,
+            preview_s: 0.0,
+        },
+        orientation: OrientationCoordinates::Log,
+    };
+    Arc::new(Problem::new(parts).unwrap())
+}
+
+/// The tasks of the Bioloid gait.
+fn gait_tasks(robot: &Robot, hands: Priority) -> Vec<(&'static str, Track, Priority)> {
+    let frame = |name| robot.frame(name).unwrap();
+    vec![
+        ("right-foot", Track::Pose(frame("r_foot")), Priority::Hard),
+        ("left-foot", Track::Pose(frame("l_foot")), Priority::Hard),
+        ("waist", Track::Pose(frame("waist")), Priority::Hard),
+        ("right-hand", Track::Position(frame("r_hand")), hands.clone()),
+        ("left-hand", Track::Position(frame("l_hand")), hands),
+    ]
+}
+
+fn bioloid() -> Arc<Robot> {
+    Arc::new(embedded("bioloid").unwrap())
+}
+
+/// Bioloid with three wrist joints per arm, turning about z, y and x of the hand.
+fn bioloid_with_wrists() -> Arc<Robot> {
+    let mut text = include_str!("../../ik-core/robots/bioloid.urdf").to_owned();
+    for side in ["r", "l"] {
+        let mount = format!("<link name=\"{side}_hand\"/>");
+        assert!(text.contains(&mount), "the hand of the description has changed");
+        let mut wrist = String::new();
+        let mut parent = format!("{side}_mount");
+        for (k, axis) in ["0 0 1", "0 1 0", "1 0 0"].iter().enumerate() {
+            let child = if k == 2 {
+                format!("{side}_hand")
+            } else {
+                format!("{side}_wrist_{k}")
+            };
+            wrist += &format!(
+                "<link name=\"{child}\"/><joint name=\"{side}_wrist_joint_{k}\" type=\"continuous\"><parent \
+                 link=\"{parent}\"/><child link=\"{child}\"/><axis xyz=\"{axis}\"/></joint>"
+            );
+            parent = child;
+        }
+        let mounted = format!("<link name=\"{side}_mount\"/>{wrist}");
+        text = text
+            .replace(
+                &format!("<child link=\"{side}_hand\"/>"),
+                &format!("<child link=\"{side}_mount\"/>"),
+            )
+            .replace(&mount, &mounted);
+    }
+    let options = UrdfOptions { root: Root::Floating };
+    Arc::new(Robot::from_urdf_str(&text, "bioloid with wrists", &options).unwrap())
+}
+
+/// Numbers in ±1 from a seed (SplitMix64).
+fn numbers(seed: u64, count: usize) -> Vec<f64> {
+    let mut state = seed;
+    let mut next = || {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    };
+    (0..count).map(|_| next()).collect()
+}
+
+fn random_posture(robot: &Robot, seed: u64) -> Vec<f64> {
+    integrate(robot, &robot.neutral(), &numbers(seed, robot.nv()))
+}
+
+/// Targets where `q` puts them.
+fn targets(problem: &Problem, q: &[f64]) -> Vec<f64> {
+    let robot = problem.robot();
+    let mut page = Page::new(robot);
+    forward(robot, q, &mut page);
+    let turn = |f| {
+        so3::quaternion(&page.frame_rotation(robot, f))
+            .coords
+            .as_slice()
+            .to_vec()
+    };
+    let mut x = Vec::new();
+    for task in problem.tasks() {
+        match task.track {
+            Track::Position(f) => x.extend(page.frame_position(robot, f).iter()),
+            Track::Orientation(f) => x.extend(turn(f)),
+            Track::Pose(f) => {
+                x.extend(page.frame_position(robot, f).iter());
+                x.extend(turn(f));
+            }
+            Track::CentreOfMass => x.extend(page.centre_of_mass().iter()),
+            Track::Posture => x.extend(&q[robot.root().nq()..]),
+        }
+    }
+    x
+}
+
+/// A random change of every target, and the rates of the virtual coordinates it means over one second: in the order of
+/// the problem's tasks, linear first, as angular velocity.
+fn moved(problem: &Problem, x: &[f64], seed: u64, size: f64) -> (Vec<f64>, Vec<Vec<f64>>) {
+    let (mut to, mut rates) = (x.to_vec(), Vec::new());
+    for (i, (task, slot)) in problem.tasks().iter().zip(problem.slots()).enumerate() {
+        let rows = task.track.rows(problem.robot());
+        let change: Vec<f64> = numbers(seed * 100 + i as u64, rows)
+            .iter()
+            .map(|c| size * c)
+            .collect();
+        let turn = match task.track {
+            Track::Pose(_) => Some(3),
+            Track::Orientation(_) => Some(0),
+            _ => None,
+        };
+        let plain = turn.unwrap_or(rows);
+        for k in 0..plain {
+            to[slot.x + k] += change[k];
+        }
+        if let Some(at) = turn {
+            let c = &mut to[slot.x + at..slot.x + at + 4];
+            let before = UnitQuaternion::from_quaternion(Quaternion::new(c[3], c[0], c[1], c[2]));
+            let w = Vector3::from_column_slice(&change[at..]);
+            c.copy_from_slice((so3::exp_quaternion(&w) * before).coords.as_slice());
+        }
+        rates.push(change);
+    }
+    (to, rates)
+}
+
+fn drive(
+    problem: &Arc<Problem>,
+    parameters: &str,
+    q: &[f64],
+    x0: &[f64],
+    x1: &[f64],
+    dt_s: f64,
+) -> (Vec<f64>, Termination) {
+    let contestant = method("davies")
+        .unwrap()
+        .build(&parameters.parse().unwrap())
+        .unwrap();
+    let mut driver = Driver::new(&*contestant.formulation, problem).unwrap();
+    let rest = vec![0.0; problem.nxdot()];
+    let data = [x0, &rest, x1, &rest].concat();
+    let input = StepInput {
+        q_prev: q,
+        v_prev: &vec![0.0; problem.robot().nv()],
+        dt_s,
+        phase: WHOLE,
+        targets: Window::new(&data, problem.nx(), problem.nxdot()).unwrap(),
+        gains: &[],
+    };
+    let majors = driver.majors();
+    let (termination, _) = driver.step(&input, majors);
+    (driver.solution().v.clone(), termination)
+}
+
+fn declined(problem: &Arc<Problem>) -> Declined {
+    let contestant = method("davies").unwrap().build(&toml::Table::new()).unwrap();
+    Driver::new(&*contestant.formulation, problem).unwrap_err()
+}
+
+#[test]
+fn the_network_of_the_paper_has_the_corrected_sizes() {
+    for hands in [Priority::Hard, soft()] {
+        let robot = bioloid();
+        let problem = problem(&robot, &gait_tasks(&robot, hands));
+        let q = random_posture(&robot, 1);
+        let network = Network::new(&problem, WHOLE, &q, ReferencePoint::Task, OrientationRates::Euler);
+        assert_eq!(network.n.shape(), (24, 48));
+        assert_eq!((network.primary().ncols(), network.secondary().ncols()), (24, 24));
+        assert_eq!(Network::rank(&network.n), 24);
+        assert_eq!(Network::rank(&network.secondary()), 24);
+        let mechanism = &network.mechanism;
+        assert_eq!(
+            (
+                mechanism.joints.len(),
+                mechanism.links.len(),
+                mechanism.circuits.len()
+            ),
+            (48, 45, 4)
+        );
+        assert_eq!(mechanism.mobility(), 24);
+        // Euler's formula for one component: circuits = joints − links + 1.
+        assert_eq!(
+            mechanism.circuits.len(),
+            mechanism.joints.len() + 1 - mechanism.links.len()
+        );
+    }
+}
+
+#[test]
+fn three_more_joints_per_arm_give_the_printed_sizes() {
+    let robot = bioloid_with_wrists();
+    let mut tasks = gait_tasks(&robot, Priority::Hard);
+    for (_, track, _) in &mut tasks {
+        if let Track::Position(f) = *track {
+            *track = Track::Pose(f);
+        }
+    }
+    let problem = problem(&robot, &tasks);
+    let q = random_posture(&robot, 2);
+    let network = Network::new(&problem, WHOLE, &q, ReferencePoint::Task, OrientationRates::Euler);
+    assert_eq!(network.n.shape(), (24, 54));
+    assert_eq!((network.primary().ncols(), network.secondary().ncols()), (30, 24));
+    assert_eq!(
+        (Network::rank(&network.n), Network::rank(&network.secondary())),
+        (24, 24)
+    );
+    assert_eq!(
+        (network.mechanism.links.len(), network.mechanism.mobility()),
+        (51, 30)
+    );
+}
+
+#[test]
+fn thirty_imposed_coordinates_are_too_many_for_eighteen_joints() {
+    // The printed partition on the printed robot: every chain imposed.
+    let robot = bioloid();
+    let mut tasks = gait_tasks(&robot, Priority::Hard);
+    for (_, track, _) in &mut tasks {
+        if let Track::Position(f) = *track {
+            *track = Track::Pose(f);
+        }
+    }
+    let problem = problem(&robot, &tasks);
+    let q = random_posture(&robot, 3);
+    let network = Network::new(&problem, WHOLE, &q, ReferencePoint::Task, OrientationRates::Euler);
+    assert_eq!(network.secondary().shape(), (24, 18));
+    assert_eq!(Network::rank(&network.secondary()), 18);
+    let Declined::Mobility {
+        imposed,
+        mobility,
+        rank,
+        tasks,
+    } = declined(&problem)
+    else {
+        panic!("not refused for its mobility");
+    };
+    assert_eq!((imposed, mobility, rank), (30, 24, 24));
+    assert_eq!(tasks.len(), 5);
+}
+
+#[test]
+fn a_limb_that_is_asked_for_too_much_is_named() {
+    // 21 of 24, but six on an arm of three joints.
+    let robot = bioloid();
+    let mut tasks = gait_tasks(&robot, Priority::Hard);
+    tasks.pop();
+    tasks[3] = (
+        "right-hand",
+        Track::Pose(robot.frame("r_hand").unwrap()),
+        Priority::Hard,
+    );
+    let text = declined(&problem(&robot, &tasks)).to_string();
+    assert_eq!(
+        text,
+        "tasks [\"right-hand\"] impose 6 rows of rank 3 on a mobility of 3"
+    );
+}
+
+/// Problems whose N_s is square.
+fn square_problems() -> Vec<Arc<Problem>> {
+    let mut problems = Vec::new();
+    let robot = bioloid();
+    problems.push(problem(&robot, &gait_tasks(&robot, Priority::Hard)));
+    let mut free = gait_tasks(&robot, Priority::Hard);
+    free[2] = (
+        "waist",
+        Track::Orientation(robot.frame("waist").unwrap()),
+        Priority::Hard,
+    );
+    free.push(("com", Track::CentreOfMass, Priority::Hard));
+    problems.push(problem(&robot, &free));
+    let legs = Arc::new(embedded("coman-legs").unwrap());
+    let frame = |name| legs.frame(name).unwrap();
+    problems.push(problem(
+        &legs,
+        &[
+            ("com", Track::CentreOfMass, Priority::Hard),
+            ("left", Track::Pose(frame("l_sole")), Priority::Hard),
+            ("right", Track::Pose(frame("r_sole")), Priority::Hard),
+            ("torso", Track::Orientation(frame("Waist")), Priority::Hard),
+        ],
+    ));
+    for id in ["arm6", "slider-arm"] {
+        let arm = Arc::new(embedded(id).unwrap());
+        let tip = ik_core::robot::FrameId(arm.frames().len() - 1);
+        problems.push(problem(&arm, &[("tip", Track::Pose(tip), Priority::Hard)]));
+    }
+    let arm7 = Arc::new(embedded("arm7").unwrap());
+    problems.push(problem(&arm7, &[("rest", Track::Posture, Priority::Hard)]));
+    problems
+}
+
+/// Rates of the primary coordinates of `network`, in its order, from the rates of the tasks.
+fn primary_rates(
+    problem: &Problem,
+    network: &Network,
+    q: &[f64],
+    rates: &[Vec<f64>],
+    how: OrientationRates,
+) -> DVector<f64> {
+    let robot = problem.robot();
+    let mut page = Page::new(robot);
+    forward(robot, q, &mut page);
+    let mechanism = &network.mechanism;
+    let primary = mechanism.columns(Role::Imposed);
+    let value = |column: usize| {
+        let joint = &mechanism.joints[column];
+        let task = problem
+            .tasks()
+            .iter()
+            .position(|t| Some(&t.name) == joint.chain.as_ref())
+            .unwrap();
+        let first = mechanism
+            .joints
+            .iter()
+            .position(|j| j.chain == joint.chain)
+            .unwrap();
+        let (k, rate) = (column - first, &rates[task]);
+        let turn = |f, w: &[f64]| -> Vector3<f64> {
+            let w = Vector3::from_column_slice(w);
+            match how {
+                OrientationRates::AngularVelocity => w,
+                OrientationRates::Euler => {
+                    // Columns e_x, Rx e_y, Rx Ry e_z from the angles of R = Rx Ry Rz, by hand.
+                    let r: Matrix3<f64> = page.frame_rotation(robot, f);
+                    let (a, b) = ((-r[(1, 2)]).atan2(r[(2, 2)]), r[(0, 2)].asin());
+                    let rx = so3::exp(&Vector3::new(a, 0.0, 0.0));
+                    let ry = so3::exp(&Vector3::new(0.0, b, 0.0));
+                    let axes =
+                        Matrix3::from_columns(&[Vector3::x(), rx * Vector3::y(), rx * ry * Vector3::z()]);
+                    axes.try_inverse().unwrap() * w
+                }
+            }
+        };
+        match problem.tasks()[task].track {
+            Track::Pose(f) if k >= 3 => turn(f, &rate[3..])[k - 3],
+            Track::Orientation(f) => turn(f, rate)[k - 3],
+            _ => rate[k],
+        }
+    };
+    DVector::from_iterator(primary.len(), primary.iter().map(|&c| value(c)))
+}
+
+/// Velocity coordinates of the robot among the joints of the network: real joints, and those of a free root.
+fn real_rates(
+    problem: &Problem,
+    network: &Network,
+    secondary: &DVector<f64>,
+    how: OrientationRates,
+    v: &[f64],
+) -> Vec<(f64, f64)> {
+    let columns = network.mechanism.columns(Role::Secondary);
+    let root = problem.robot().root().nv();
+    let mut pairs = Vec::new();
+    for (s, &column) in columns.iter().enumerate() {
+        let euler = how == OrientationRates::Euler && (3..root).contains(&column);
+        if column < problem.robot().nv() && !euler {
+            pairs.push((v[column], secondary[s]));
+        }
+    }
+    pairs
+}
+
+#[test]
+fn a_square_network_is_solved_as_eq_9_says() {
+    let (mut compared, mut worst) = (0, 0.0_f64);
+    for problem in square_problems() {
+        for seed in 0..60 {
+            for how in [OrientationRates::AngularVelocity, OrientationRates::Euler] {
+                let q = random_posture(problem.robot(), seed);
+                let network = Network::new(&problem, WHOLE, &q, ReferencePoint::Task, how);
+                let ns = network.secondary();
+                assert!(ns.is_square());
+                if network.condition() > 1e4 {
+                    continue;
+                }
+                let x = targets(&problem, &q);
+                let (to, rates) = moved(&problem, &x, seed + 7, 0.3);
+                let qp = primary_rates(&problem, &network, &q, &rates, how);
+                let expected = -ns.full_piv_lu().solve(&(network.primary() * qp)).unwrap();
+                // The method moves its Euler angles, the targets turn at a constant rate: only the latter are compared.
+                let (v, said) = drive(&problem, "correction = 0.0", &q, &x, &to, 1.0);
+                assert_eq!(said, Termination::Stepped);
+                let scale = v.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+                for (found, expected) in real_rates(&problem, &network, &expected, how, &v) {
+                    worst = worst.max((found - expected).abs() / scale);
+                    compared += 1;
+                }
+            }
+        }
+    }
+    println!("{compared} rates, worst relative difference {worst:e}");
+    assert!(compared > 5000 && worst < 1e-12, "{compared} {worst:e}");
+}
+
+#[test]
+fn euler_rates_and_angular_velocity_impose_the_same_motion_to_first_order() {
+    // Both bring every frame to its target; over a small step they differ by the square of the turn.
+    for problem in square_problems() {
+        for seed in 0..20 {
+            let q = random_posture(problem.robot(), seed);
+            let network = Network::new(&problem, WHOLE, &q, ReferencePoint::Task, OrientationRates::Euler);
+            if network.condition() > 1e3 {
+                continue;
+            }
+            let x = targets(&problem, &q);
+            let (to, _) = moved(&problem, &x, seed, 1e-5);
+            let (a, _) = drive(&problem, "orientation = 'angular-velocity'", &q, &x, &to, 1.0);
+            let (b, _) = drive(&problem, "orientation = 'euler-rates'", &q, &x, &to, 1.0);
+            let scale = a.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            assert!(
+                a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-2 * scale),
+                "{seed}"
+            );
+            assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-6), "{seed}");
+        }
+    }
+}
+
+#[test]
+fn a_redundant_robot_on_a_fixed_foot_moves_by_its_pseudo_inverse() {
+    let (mut compared, mut worst) = (0, 0.0_f64);
+    for (id, foot, tasks) in [
+        ("coman", "l_sole", &["r_sole", "Waist"][..]),
+        ("coman", "r_sole", &["LForearm", "RForearm"]),
+        ("bioloid", "r_foot", &["l_hand"]),
+        ("bioloid", "l_foot", &["r_hand", "r_foot"]),
+    ] {
+        let robot = Arc::new(embedded(id).unwrap());
+        let known: Vec<_> = robot.frames().iter().map(|f| f.name.clone()).collect();
+        let frame = |name: &str| {
+            robot
+                .frame(name)
+                .unwrap_or_else(|_| panic!("{name} of {known:?}"))
+        };
+        let mut list = vec![("foot", Track::Pose(frame(foot)), Priority::Hard)];
+        for name in tasks {
+            list.push((name, Track::Position(frame(name)), Priority::Hard));
+        }
+        list.push(("com", Track::CentreOfMass, Priority::Hard));
+        let problem = problem(&robot, &list);
+        for seed in 0..40 {
+            let q = random_posture(&robot, seed);
+            let x = targets(&problem, &q);
+            let (mut to, rates) = moved(&problem, &x, seed, 0.2);
+            to[..7].copy_from_slice(&x[..7]);
+            // The robot re-rooted at its foot: root rates from those of the joints.
+            let mut page = Page::new(&robot);
+            forward(&robot, &q, &mut page);
+            let whole = frame_jacobian(&robot, &page, frame(foot), Axes::World);
+            let joints = robot.nv() - 6;
+            let carried =
+                -whole.fixed_columns::<6>(0).into_owned().try_inverse().unwrap() * whole.columns(6, joints);
+            let (mut j, mut y) = (DMatrix::zeros(3 * tasks.len() + 3, joints), Vec::new());
+            for (i, (_, track, _)) in list[1..].iter().enumerate() {
+                let rows = match *track {
+                    Track::Position(f) => frame_jacobian(&robot, &page, f, Axes::World)
+                        .rows(0, 3)
+                        .into_owned(),
+                    _ => {
+                        let columns: Vec<_> =
+                            (0..robot.nv()).map(|v| page.centre_of_mass_column(v)).collect();
+                        DMatrix::from_fn(3, robot.nv(), |r, c| columns[c][r])
+                    }
+                };
+                let reduced = rows.columns(0, 6) * &carried + rows.columns(6, joints);
+                j.rows_mut(3 * i, 3).copy_from(&reduced);
+                y.extend(&rates[1 + i]);
+            }
+            let values = j.singular_values();
+            if values[0] / values[values.len() - 1] > 1e4 {
+                continue;
+            }
+            let expected = j.pseudo_inverse(1e-12).unwrap() * DVector::from_vec(y);
+            let (v, said) = drive(&problem, "correction = 0.0", &q, &x, &to, 1.0);
+            assert_eq!(said, Termination::Stepped);
+            let scale = v.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            for (found, expected) in v[6..].iter().zip(expected.iter()) {
+                worst = worst.max((found - expected).abs() / scale);
+                compared += 1;
+            }
+        }
+    }
+    println!("{compared} rates, worst relative difference {worst:e}");
+    assert!(compared > 2000 && worst < 1e-12, "{compared} {worst:e}");
+}
