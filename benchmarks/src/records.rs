@@ -86,6 +86,16 @@ pub struct Quality {
     pub com_error_max_m: Option<f64>,
     /// Per compromised task: RMS of its error (m or rad), by task name.
     pub soft_error_rms: BTreeMap<String, f64>,
+    /// Its largest value, by the same names.
+    #[serde(default)]
+    pub soft_error_max: BTreeMap<String, f64>,
+    /// RMS of the compromised task that has the largest, among those that place a point: a frame's position, that of a
+    /// pose, the centre of mass (m); none without such a task.
+    #[serde(default)]
+    pub soft_error_rms_m: Option<f64>,
+    /// Largest error of any of them (m).
+    #[serde(default)]
+    pub soft_error_max_m: Option<f64>,
     /// Largest component of any hard position row (m).
     pub hard_error_max_m: f64,
     /// Largest rotation angle of any hard orientation task (rad).
@@ -116,10 +126,45 @@ pub struct Quality {
     pub singularity_exit_s: Option<f64>,
     /// Mean over t ≥ 1 s of the sum of squared static joint torques (N²m²), where asked for.
     pub torque_squared_mean_n2m2: Option<f64>,
+    /// Least signed distance over k ≥ 0 of the projected centre of mass to the border of the support polygon (m), positive
+    /// inside. None, as the next three, where the suite names no soles.
+    #[serde(default)]
+    pub gcom_margin_min_m: Option<f64>,
+    /// The same of the zero-moment point of point masses (m), over 1 ≤ k < N. None also if some sample has no such point
+    /// because the ground would have to pull.
+    #[serde(default)]
+    pub zmp_margin_min_m: Option<f64>,
+    /// The same of the zero-moment point of the cart (m), over 1 ≤ k < N.
+    #[serde(default)]
+    pub cart_zmp_margin_min_m: Option<f64>,
+    /// RMS over 1 ≤ k < N of the distance between the zero-moment point of point masses and the projected centre of mass
+    /// (m). None also as before.
+    #[serde(default)]
+    pub zmp_gcom_distance_rms_m: Option<f64>,
     /// All finite, limit violation ≤ 1e-6 rad, boundary value ≤ 1e-4 (a polygon: excess ≤ 1e-6 rad
     /// instead, a box: no speed limit passed), hard errors
-    /// < 1e-3, centre-of-mass error below the tolerance of the suite.
+    /// < 1e-3, `soft_error_max_m` below the tolerance of the suite. Balance does not count.
     pub survived: bool,
+}
+
+impl Quality {
+    /// [`Quality::soft_error_rms_m`]. Rows recorded before it existed have the error of the centre of mass in its place, the
+    /// only such task that suites had.
+    pub fn worst_soft_rms_m(&self) -> Option<f64> {
+        let before = self.com_error_rms_m.filter(|_| self.lacks_soft_maxima());
+        self.soft_error_rms_m.or(before)
+    }
+
+    /// [`Quality::soft_error_max_m`], with the same substitute.
+    pub fn worst_soft_max_m(&self) -> Option<f64> {
+        let before = self.com_error_max_m.filter(|_| self.lacks_soft_maxima());
+        self.soft_error_max_m.or(before)
+    }
+
+    /// Every compromised task has both, unless the row is older.
+    fn lacks_soft_maxima(&self) -> bool {
+        self.soft_error_max.is_empty() && !self.soft_error_rms.is_empty()
+    }
 }
 
 /// What the steps cost.
@@ -159,6 +204,12 @@ pub struct Effort {
 /// per task `<task>_target_<component>` (x y z, roll pitch yaw, or qx qy qz qw), the actual point `<task>_x _y _z` (m) of
 /// tasks that track one, `<task>_error_m` and/or `<task>_error_rad` (norm, angle), `<task>_rate_error_m_s` for the centre of mass; `step_us`, `majors`, `minors` (0 at
 /// k = 0); where the suite asks for torques `torque_<joint>` (Nm).
+///
+/// Where it names soles, all on the ground, in m and in the world: `gcom_x gcom_y` (projected centre of mass), `zmp_x zmp_y`
+/// (zero-moment point of point masses), `cart_zmp_x cart_zmp_y` (that of the cart), `support_x_min support_x_max
+/// support_y_min support_y_max` (extent of the support polygon), `gcom_margin zmp_margin` (signed distances to its border,
+/// positive inside). Accelerations at k = 0 and N are those at k = 1 and N − 1. Where the ground would have to pull there is
+/// no zero-moment point: `zmp_x zmp_y zmp_margin` are NaN.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
     /// Column names.

@@ -48,9 +48,10 @@ pub fn summary_markdown(rows: &[Row], analysis: &BTreeMap<String, String>) -> St
         ));
     }
     text.push_str(
-        "\nhard max: the larger of the largest hard position component (m) and rotation angle (rad). exit: when the knees \
-         left the singularity for good. g max: largest boundary value, at most 0 inside the ellipse. ×ik1: median step \
-         time relative to ik1 on the same scenario.\n",
+        "\nsoft: distance of the compromised task (a frame or the centre of mass) that misses its point most. hard max: the \
+         larger of the largest hard position component (m) and rotation angle (rad). exit: when the knees left the \
+         singularity for good. g max: largest boundary value, at most 0 inside the ellipse. ×ik1: median step time \
+         relative to ik1 on the same scenario.\n",
     );
     text
 }
@@ -59,8 +60,8 @@ const HEADER: [&str; 14] = [
     "scenario",
     "method",
     "n",
-    "CoM rms (mm)",
-    "CoM max (mm)",
+    "soft rms (mm)",
+    "soft max (mm)",
     "hard max (m, rad)",
     "exit (s)",
     "g max",
@@ -81,8 +82,8 @@ fn cells(run: &Labelled<'_>) -> Vec<String> {
         return cells;
     };
     cells.extend([
-        number(quality.com_error_rms_m.map(|e| e * 1e3)),
-        number(quality.com_error_max_m.map(|e| e * 1e3)),
+        number(quality.worst_soft_rms_m().map(|e| e * 1e3)),
+        number(quality.worst_soft_max_m().map(|e| e * 1e3)),
         number(Some(hard_max(quality))),
         seconds(quality.singularity_exit_s),
         number(quality.boundary_value_max),

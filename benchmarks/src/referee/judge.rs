@@ -1,6 +1,7 @@
 //! The quality numbers of a run, one group of fields at a time. Definitions: [`Quality`] and
 //! [`Referee::judge`].
 
+use super::balance::judge_balance;
 use super::limits::{ellipse_value, polygon_excess, position_violation};
 use super::tasks::{TaskError, hard_then_soft, jacobian, rate_of, task_error};
 use super::torque::static_torques;
@@ -42,12 +43,17 @@ pub(super) fn judge(referee: &Referee, run: &Run<'_>) -> Quality {
     judge_ranks(problem, &readable, &mut quality);
     quality.singularity_exit_s = exit_time(referee, &readable, run.dt_s);
     quality.torque_squared_mean_n2m2 = torque_squared_mean(referee, &readable);
-    quality.survived =
-        readable.complete && survives(&quality, referee.problem.boundary(), referee.spec.com_tolerance_m);
+    judge_balance(referee, &readable, run.dt_s, &mut quality);
+    quality.survived = readable.complete
+        && survives(
+            &quality,
+            referee.problem.boundary(),
+            referee.spec.soft_tolerance_m,
+        );
     quality
 }
 
-pub(super) fn survives(quality: &Quality, boundary: &Boundary, com_tolerance_m: f64) -> bool {
+pub(super) fn survives(quality: &Quality, boundary: &Boundary, soft_tolerance_m: f64) -> bool {
     // Polygon and box reach outside the ellipse of eq. (6): who was given one is held to it.
     let inside = match boundary {
         Boundary::Polygon { .. } => quality
@@ -61,27 +67,61 @@ pub(super) fn survives(quality: &Quality, boundary: &Boundary, com_tolerance_m: 
         && quality.hard_error_max_m < HARD_TOLERANCE
         && quality.hard_error_max_rad < HARD_TOLERANCE
         && quality
-            .com_error_max_m
-            .is_none_or(|error| error < com_tolerance_m)
+            .soft_error_max_m
+            .is_none_or(|error| error < soft_tolerance_m)
 }
 
 /// Root of the mean of squares, and the largest.
 #[derive(Clone, Copy, Debug, Default)]
-struct Spread {
+pub(super) struct Spread {
     squares: f64,
     count: u32,
     largest: f64,
 }
 
 impl Spread {
-    fn add(&mut self, value: f64) {
+    pub(super) fn add(&mut self, value: f64) {
         self.squares += value * value;
         self.count += 1;
         self.largest = self.largest.max(value);
     }
 
-    fn rms(&self) -> Option<f64> {
+    pub(super) fn rms(&self) -> Option<f64> {
         (self.count > 0).then(|| (self.squares / f64::from(self.count)).sqrt())
+    }
+}
+
+/// Errors of the compromised tasks, by the names of [`Quality::soft_error_rms`].
+#[derive(Debug, Default)]
+struct SoftErrors {
+    m: BTreeMap<String, Spread>,
+    rad: BTreeMap<String, Spread>,
+}
+
+impl SoftErrors {
+    fn add(&mut self, name: &str, error: &TaskError) {
+        let both = error.m.is_some() && error.rad.is_some();
+        for (spreads, miss, unit) in [(&mut self.m, error.m, "_m"), (&mut self.rad, error.rad, "_rad")] {
+            if let Some(miss) = miss {
+                let name = if both {
+                    format!("{name}{unit}")
+                } else {
+                    name.to_owned()
+                };
+                spreads.entry(name).or_default().add(miss.norm);
+            }
+        }
+    }
+
+    fn report(self, quality: &mut Quality) {
+        quality.soft_error_rms_m = self.m.values().filter_map(Spread::rms).reduce(f64::max);
+        quality.soft_error_max_m = self.m.values().map(|s| s.largest).reduce(f64::max);
+        for (name, spread) in self.m.into_iter().chain(self.rad) {
+            if let Some(rms) = spread.rms() {
+                quality.soft_error_rms.insert(name.clone(), rms);
+                quality.soft_error_max.insert(name, spread.largest);
+            }
+        }
     }
 }
 
@@ -93,7 +133,7 @@ fn raise(most: &mut f64, value: f64) {
 /// Errors of the centre of mass, of hard and of compromised tasks over k ≥ 0.
 fn judge_tracking(problem: &Problem, readable: &Readable<'_>, quality: &mut Quality) {
     let mut com = Spread::default();
-    let mut soft: BTreeMap<String, Spread> = BTreeMap::new();
+    let mut soft = SoftErrors::default();
     for (sample, posture) in readable.iter() {
         let (hard_tasks, soft_tasks) = hard_then_soft(problem, sample.phase);
         for (tasks, hard) in [(hard_tasks, true), (soft_tasks, false)] {
@@ -106,17 +146,14 @@ fn judge_tracking(problem: &Problem, readable: &Readable<'_>, quality: &mut Qual
                 if hard {
                     record_hard(&named.name, &error, quality);
                 } else {
-                    record_soft(&named.name, &error, &mut soft);
+                    soft.add(&named.name, &error);
                 }
             }
         }
     }
     quality.com_error_rms_m = com.rms();
     quality.com_error_max_m = com.rms().map(|_| com.largest);
-    quality.soft_error_rms = soft
-        .into_iter()
-        .filter_map(|(name, spread)| Some((name, spread.rms()?)))
-        .collect();
+    soft.report(quality);
 }
 
 fn record_hard(name: &str, error: &TaskError, quality: &mut Quality) {
@@ -133,18 +170,6 @@ fn record_hard(name: &str, error: &TaskError, quality: &mut Quality) {
             quality.hard_error_max.entry(format!("{name}_rad")).or_default(),
             rad.largest,
         );
-    }
-}
-
-fn record_soft(name: &str, error: &TaskError, soft: &mut BTreeMap<String, Spread>) {
-    let mut add = |name: String, value: f64| soft.entry(name).or_default().add(value);
-    match (error.m, error.rad) {
-        (Some(m), Some(rad)) => {
-            add(format!("{name}_m"), m.norm);
-            add(format!("{name}_rad"), rad.norm);
-        }
-        (Some(one), None) | (None, Some(one)) => add(name.to_owned(), one.norm),
-        (None, None) => {}
     }
 }
 

@@ -1,7 +1,7 @@
 //! The referee: recomputes every quality number of a run from the returned configurations alone.
 //!
 //! It judges with its own, deliberately simple kinematics (`tree.rs`), its own error measures (`tasks.rs`),
-//! boundary conditions (`limits.rs`) and torques (`torque.rs`). What a method says about itself is never
+//! boundary conditions (`limits.rs`), torques (`torque.rs`) and balance (`balance.rs`). What a method says about itself is never
 //! read, except by [`Referee::own_stationarity`], which checks such a claim.
 //!
 //! A run is judged as far as it can be read: up to the first sample that is no configuration (wrong length, a
@@ -9,7 +9,9 @@
 //! or that has no such target. Numbers judged are therefore always finite, and a run that ends early has not
 //! survived.
 
+mod balance;
 mod certificate;
+mod hull;
 mod judge;
 mod limits;
 mod rows;
@@ -20,13 +22,15 @@ mod torque;
 mod trace;
 mod tree;
 
+pub use balance::{Foot, Sole};
 pub use certificate::{Certificate, CertifiedStep, OwnStationarity};
 pub use trace::StepEfforts;
 
 use crate::records::{Quality, Trace};
+use crate::trajectory::Support;
 use ik_core::formulation::Claim;
 use ik_core::problem::{PhaseId, Problem};
-use ik_core::robot::{FrameId, Root};
+use ik_core::robot::{FrameId, Robot, Root};
 use ik_core::task::{OrientationCoordinates, Track};
 use std::sync::Arc;
 use tree::Posture;
@@ -49,24 +53,29 @@ pub struct Run<'a> {
     pub targets: &'a [f64],
     /// Phase of each sample k ≥ 1, or one phase for all.
     pub phases: &'a [PhaseId],
+    /// Feet on the ground at each sample k ≥ 0; empty: always both.
+    pub support: &'a [Support],
 }
 
 /// What a suite wants to be judged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JudgeSpec {
-    /// Largest centre-of-mass error of a run that survives (m).
-    pub com_tolerance_m: f64,
+    /// What the distance of every compromised task that places a point (a frame, the centre of mass) stays below in a
+    /// run that survives (m).
+    pub soft_tolerance_m: f64,
     /// Joints whose exit from the straight leg is timed; empty: not asked for.
     pub exit_joints: Vec<String>,
     /// Frames the robot stands on; empty: torques are not asked for.
     pub torque_supports: Vec<FrameId>,
+    /// What each foot stands on, both feet at least once; empty: balance is not asked for.
+    pub soles: Vec<Sole>,
 }
 
 /// What the referee cannot work with.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RefereeError {
     /// A tolerance that nothing or everything passes.
-    #[error("com_tolerance_m = {0}: must be a finite number above 0")]
+    #[error("soft_tolerance_m = {0}: must be a finite number above 0")]
     Tolerance(f64),
     /// An exit joint the robot lacks.
     #[error("exit_joints: `{name}` is no joint of `{robot}`; its joints are {known:?}")]
@@ -78,9 +87,11 @@ pub enum RefereeError {
         /// Joints there are.
         known: Vec<String>,
     },
-    /// A support the robot lacks.
-    #[error("torque_supports: frame {frame} does not exist, `{robot}` has {count} frames")]
+    /// A support or sole the robot lacks.
+    #[error("{field}: frame {frame} does not exist, `{robot}` has {count} frames")]
     Frame {
+        /// Which field names it.
+        field: &'static str,
         /// Index found.
         frame: usize,
         /// Name of the robot.
@@ -88,6 +99,19 @@ pub enum RefereeError {
         /// Number of frames.
         count: usize,
     },
+    /// A sole without extent.
+    #[error("soles[{index}].{field} = {found}: must be above 0 and at most {LARGEST_READABLE:e}")]
+    Sole {
+        /// Which sole.
+        index: usize,
+        /// Which extent.
+        field: &'static str,
+        /// Its value (m).
+        found: f64,
+    },
+    /// Soles of one foot only.
+    #[error("soles: none has foot = \"{0}\"; a suite that names soles names those of both feet")]
+    Foot(&'static str),
     /// A vector of the wrong length.
     #[error("{field} has {found} numbers, needed are {needed}")]
     Length {
@@ -128,10 +152,11 @@ impl Referee {
     /// A referee for `problem`.
     ///
     /// # Errors
-    /// A joint or frame of `spec` that the robot lacks, or a tolerance that is not a positive number.
+    /// A joint or frame of `spec` that the robot lacks, a tolerance or extent that is not a positive number, soles of
+    /// one foot only.
     pub fn new(problem: &Arc<Problem>, spec: JudgeSpec) -> Result<Self, RefereeError> {
-        if !(spec.com_tolerance_m.is_finite() && spec.com_tolerance_m > 0.0) {
-            return Err(RefereeError::Tolerance(spec.com_tolerance_m));
+        if !(spec.soft_tolerance_m.is_finite() && spec.soft_tolerance_m > 0.0) {
+            return Err(RefereeError::Tolerance(spec.soft_tolerance_m));
         }
         let robot = problem.robot();
         let exit = spec
@@ -139,13 +164,9 @@ impl Referee {
             .iter()
             .map(|name| coordinate(problem, name))
             .collect::<Result<_, _>>()?;
-        if let Some(frame) = spec.torque_supports.iter().find(|f| f.0 >= robot.frames().len()) {
-            return Err(RefereeError::Frame {
-                frame: frame.0,
-                robot: robot.name().to_owned(),
-                count: robot.frames().len(),
-            });
-        }
+        check_frames(robot, "torque_supports", spec.torque_supports.iter().copied())?;
+        check_frames(robot, "soles", spec.soles.iter().map(|sole| sole.frame))?;
+        check_soles(&spec.soles)?;
         Ok(Self {
             problem: Arc::clone(problem),
             spec,
@@ -157,8 +178,9 @@ impl Referee {
     /// [`Quality::survived`] is false. A run whose start cannot be read is [`Quality::default`].
     ///
     /// Choices beyond the documentation of [`Quality`]: tasks count in the phases they belong to, k = 0 in
-    /// that of k = 1. A compromised pose has two entries in `soft_error_rms`, `<task>_m` and `<task>_rad`. A
-    /// posture task is measured in rad. Singular values are those of every sample. A polygon reaches past the
+    /// that of k = 1. A compromised pose has two entries in `soft_error_rms` and `soft_error_max`, `<task>_m` and
+    /// `<task>_rad`. A posture task is measured in rad. Balance does not decide survival: what a gait asks of it is
+    /// the same for every method that follows the gait. Singular values are those of every sample. A polygon reaches past the
     /// ellipse: a run that was given one is held to it, and its value of eq. (6) is reported only.
     pub fn judge(&self, run: &Run<'_>) -> Quality {
         judge::judge(self, run)
@@ -166,7 +188,7 @@ impl Referee {
 
     /// The columns documented at [`Trace`], for as many samples as can be read. Joint columns are those of
     /// the independent coordinates; `<task>_rate_error_m_s` is 0 at k = 0; columns of a task are filled in
-    /// every phase.
+    /// every phase. Balance at k = 0 and k = N is that of the accelerations at k = 1 and N − 1.
     pub fn trace(&self, run: &Run<'_>, efforts: &StepEfforts<'_>) -> Trace {
         trace::trace(self, run, efforts)
     }
@@ -193,6 +215,43 @@ impl Referee {
     ) -> Result<OwnStationarity, RefereeError> {
         certificate::own_stationarity(&self.problem, claim, step)
     }
+}
+
+fn check_frames(
+    robot: &Robot,
+    field: &'static str,
+    mut frames: impl Iterator<Item = FrameId>,
+) -> Result<(), RefereeError> {
+    let count = robot.frames().len();
+    frames.find(|f| f.0 >= count).map_or(Ok(()), |frame| {
+        Err(RefereeError::Frame {
+            field,
+            frame: frame.0,
+            robot: robot.name().to_owned(),
+            count,
+        })
+    })
+}
+
+fn check_soles(soles: &[Sole]) -> Result<(), RefereeError> {
+    for (index, sole) in soles.iter().enumerate() {
+        let extents = [
+            ("half_length_m", sole.half_length_m),
+            ("half_width_m", sole.half_width_m),
+        ];
+        for (field, found) in extents {
+            if !(found > 0.0 && found <= LARGEST_READABLE) {
+                return Err(RefereeError::Sole { index, field, found });
+            }
+        }
+    }
+    // In single support a polygon of no sole would have no corners.
+    for (foot, word) in [(Foot::Right, "right"), (Foot::Left, "left")] {
+        if !soles.is_empty() && soles.iter().all(|sole| sole.foot != foot) {
+            return Err(RefereeError::Foot(word));
+        }
+    }
+    Ok(())
 }
 
 fn coordinate(problem: &Problem, name: &str) -> Result<usize, RefereeError> {
@@ -239,6 +298,7 @@ struct Sample<'a> {
     x: &'a [f64],
     xdot: &'a [f64],
     phase: PhaseId,
+    support: Support,
 }
 
 /// The part of a run that can be read, with the posture at each sample.
@@ -282,6 +342,10 @@ fn sample<'a>(problem: &Problem, run: &Run<'a>, k: usize) -> Option<Sample<'a>> 
         [only] => *only,
         several => *several.get(k.max(1) - 1)?,
     };
+    let support = match run.support {
+        [] => Support::Both,
+        each => *each.get(k)?,
+    };
     let readable = is_configuration(problem, q) && is_target(problem, x) && is_readable(xdot);
     let posed = (1.0 / LARGEST_READABLE..LARGEST_READABLE).contains(&run.dt_s);
     let posed = posed && phase.0 < problem.phases().len();
@@ -291,5 +355,6 @@ fn sample<'a>(problem: &Problem, run: &Run<'a>, k: usize) -> Option<Sample<'a>> 
         x,
         xdot,
         phase,
+        support,
     })
 }

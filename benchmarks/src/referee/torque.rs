@@ -10,7 +10,7 @@ use ik_core::robot::{FrameId, Robot, Root};
 use nalgebra::{DMatrix, DVector};
 
 /// Standard gravity (m/s²), acting along −z.
-const STANDARD_GRAVITY_M_S2: f64 = 9.806_65;
+pub(super) const STANDARD_GRAVITY_M_S2: f64 = 9.806_65;
 
 /// Gradient of the potential energy along each velocity coordinate (N, Nm).
 fn potential_gradient(robot: &Robot, posture: &Posture) -> DVector<f64> {

@@ -1,5 +1,6 @@
 //! The run as a table over time; columns are documented at [`Trace`].
 
+use super::balance::{Balance, balance};
 use super::judge::com_rate_error;
 use super::tasks::{target_of, task_error, tracked_frames, tracked_point};
 use super::torque::static_torques;
@@ -22,12 +23,51 @@ pub struct StepEfforts<'a> {
 
 pub(super) fn trace(referee: &Referee, run: &Run<'_>, efforts: &StepEfforts<'_>) -> Trace {
     let readable = Readable::new(&referee.problem, run);
+    let mut rows: Vec<_> = (0..readable.samples.len())
+        .map(|k| row(referee, &readable, k, run.dt_s, efforts))
+        .collect();
+    for (row, balance) in rows.iter_mut().zip(balance(referee, &readable, run.dt_s)) {
+        row.extend(balance_values(&balance));
+    }
     Trace {
         columns: columns(referee),
-        rows: (0..readable.samples.len())
-            .map(|k| row(referee, &readable, k, run.dt_s, efforts))
-            .collect(),
+        rows,
     }
+}
+
+const BALANCE_COLUMNS: [&str; 12] = [
+    "gcom_x",
+    "gcom_y",
+    "zmp_x",
+    "zmp_y",
+    "cart_zmp_x",
+    "cart_zmp_y",
+    "support_x_min",
+    "support_x_max",
+    "support_y_min",
+    "support_y_max",
+    "gcom_margin",
+    "zmp_margin",
+];
+
+fn balance_values(balance: &Balance) -> [f64; BALANCE_COLUMNS.len()] {
+    let (gcom, cart) = (balance.gcom, balance.cart_zmp);
+    let zmp = balance.zmp.map_or([f64::NAN; 2], |zmp| [zmp.x, zmp.y]);
+    let (low, high) = balance.polygon.bounds();
+    [
+        gcom.x,
+        gcom.y,
+        zmp[0],
+        zmp[1],
+        cart.x,
+        cart.y,
+        low.x,
+        high.x,
+        low.y,
+        high.y,
+        balance.gcom_margin_m(),
+        balance.zmp_margin_m().unwrap_or(f64::NAN),
+    ]
 }
 
 fn columns(referee: &Referee) -> Vec<String> {
@@ -44,6 +84,9 @@ fn columns(referee: &Referee) -> Vec<String> {
     columns.extend(["step_us", "majors", "minors"].map(str::to_owned));
     if !referee.spec.torque_supports.is_empty() {
         columns.extend(joints().map(|joint| format!("torque_{joint}")));
+    }
+    if !referee.spec.soles.is_empty() {
+        columns.extend(BALANCE_COLUMNS.map(str::to_owned));
     }
     columns
 }

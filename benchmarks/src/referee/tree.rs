@@ -137,7 +137,7 @@ fn add(out: &mut DMatrix<f64>, row: usize, v: usize, value: Vector3<f64>) {
 }
 
 /// Body, mass (kg) and centre of mass (m, world) of every body that can move and has mass.
-fn moving_masses<'a>(
+pub(super) fn moving_masses<'a>(
     robot: &'a Robot,
     poses: &'a [Isometry3<f64>],
 ) -> impl Iterator<Item = (usize, f64, Vector3<f64>)> + 'a {

@@ -2,9 +2,9 @@
 //! anything runs or is written.
 
 use super::problem_spec::{LimitsSpec, ProblemSpec, frame};
-use super::{ScenarioSpec, StartSpec, Suite};
+use super::{ScenarioSpec, SoleSpec, StartSpec, Suite};
 use crate::error::{InputError, finite};
-use crate::referee::{JudgeSpec, Referee};
+use crate::referee::{JudgeSpec, Referee, Sole};
 use crate::trajectory::{Grid, Rates, Samples, Trajectory};
 use ik_core::boundary::Boundary;
 use ik_core::problem::Problem;
@@ -171,16 +171,33 @@ fn judge(suite: &Suite, problem: &Arc<Problem>) -> Result<Referee, InputError> {
     let supports = suite.torque_supports.iter();
     let place = format!("{}: torque_supports", suite.source);
     let spec = JudgeSpec {
-        com_tolerance_m: suite.com_tolerance_m,
+        soft_tolerance_m: suite.soft_tolerance_m,
         exit_joints: suite.exit_joints.clone(),
         torque_supports: supports
             .map(|name| frame(robot, name, &place))
+            .collect::<Result<_, _>>()?,
+        soles: suite
+            .soles
+            .iter()
+            .enumerate()
+            .map(|(i, sole)| sole.build(robot, &format!("{}: soles[{i}]", suite.source)))
             .collect::<Result<_, _>>()?,
     };
     Referee::new(problem, spec).map_err(|e| InputError::Syntax {
         file: suite.source.clone(),
         reason: e.to_string(),
     })
+}
+
+impl SoleSpec {
+    fn build(&self, robot: &Robot, place: &str) -> Result<Sole, InputError> {
+        Ok(Sole {
+            frame: frame(robot, &self.frame, place)?,
+            half_length_m: self.half_length_m,
+            half_width_m: self.half_width_m,
+            foot: self.foot,
+        })
+    }
 }
 
 impl StartSpec {

@@ -10,6 +10,7 @@ pub(crate) use lineup::{build, known_method};
 pub use problem_spec::{LimitsSpec, PrioritySpec, ProblemSpec, RobotSpec, TaskSpec, TrackSpec};
 
 use crate::error::InputError;
+use crate::referee::Foot;
 use crate::trajectory::MotionSpec;
 use ik_core::boundary::Boundary;
 use serde::{Deserialize, Serialize};
@@ -28,14 +29,18 @@ pub struct Suite {
     pub analysis: String,
     /// Time step (s).
     pub dt_s: f64,
-    /// Largest centre-of-mass error of a run that survives (m).
-    pub com_tolerance_m: f64,
+    /// Largest distance, in a run that survives, of any compromised task that places a point: a frame's position, that of a
+    /// pose, the centre of mass (m).
+    pub soft_tolerance_m: f64,
     /// Joints whose exit from the straight leg is timed.
     #[serde(default)]
     pub exit_joints: Vec<String>,
     /// Frames that carry the robot where static torques are asked for.
     #[serde(default)]
     pub torque_supports: Vec<String>,
+    /// What each foot stands on, where balance is asked for.
+    #[serde(default)]
+    pub soles: Vec<SoleSpec>,
     /// The problem of all scenarios.
     pub problem: ProblemSpec,
     /// Named start configurations.
@@ -48,6 +53,20 @@ pub struct Suite {
     /// Where it was read from, for messages.
     #[serde(skip)]
     pub source: String,
+}
+
+/// What a foot stands on: a rectangle around the origin of a frame, in its x–y plane, x forwards.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SoleSpec {
+    /// Name of the frame.
+    pub frame: String,
+    /// Half of the extent along x (m).
+    pub half_length_m: f64,
+    /// Half of the extent along y (m).
+    pub half_width_m: f64,
+    /// The foot it belongs to.
+    pub foot: Foot,
 }
 
 /// A start configuration.

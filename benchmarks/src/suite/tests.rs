@@ -190,15 +190,15 @@ fn bad_suites_are_refused_with_place_field_value_and_remedy() {
                 "mine.toml",
                 &format!("line {}", line + 1),
                 "colour",
-                "com_tolerance_m",
+                "soft_tolerance_m",
             ],
         ),
         ("dt_s = 0.005", "dt_s = 0", &["dt_s = 0", "above 0"]),
         ("dt_s = 0.005", "dt_s = nan", &["dt_s = NaN", "finite"]),
         (
-            "com_tolerance_m = 0.08",
-            "com_tolerance_m = -1",
-            &["com_tolerance_m = -1", "above 0"],
+            "soft_tolerance_m = 0.08",
+            "soft_tolerance_m = -1",
+            &["soft_tolerance_m = -1", "above 0"],
         ),
         (
             "amplitude = 0.03",
@@ -275,6 +275,49 @@ fn bad_suites_are_refused_with_place_field_value_and_remedy() {
 }
 
 #[test]
+fn soles_turn_balance_on_and_are_checked() {
+    let soles = |left: &str| {
+        let right = "frame = 'r_sole'\nhalf_length_m = 0.1\nhalf_width_m = 0.05\nfoot = 'right'";
+        format!("[[soles]]\n{right}\n[[soles]]\n{left}\n\n[problem]")
+    };
+    let good = "frame = 'l_sole'\nhalf_length_m = 0.1\nhalf_width_m = 0.05\nfoot = 'left'";
+    let suite = |left: &str| EMBEDDED[0].1.replacen("[problem]", &soles(left), 1);
+    let parsed = Suite::parse(&suite(good), "mine.toml", Path::new(".")).unwrap();
+    assert_eq!(parsed.soles.len(), 2);
+    let case = Case::new(&parsed, 0, &Variation::default()).unwrap();
+    let start = crate::referee::Run {
+        dt_s: case.dt_s,
+        q: std::slice::from_ref(&case.q_start),
+        targets: case.samples.judged(),
+        phases: &[ik_core::problem::PhaseId(0)],
+        support: &[],
+    };
+    let margin = case.referee.judge(&start).gcom_margin_min_m.unwrap();
+    assert!(margin > 0.0 && margin <= 0.1, "{margin}");
+    let fails = |from: &str, to: &str| message("[problem]", &soles(&good.replacen(from, to, 1)));
+    let expectations: [(&str, &str, &[&str]); 5] = [
+        (
+            "l_sole",
+            "l_soul",
+            &["soles[1]", "frame `l_soul`", "did you mean `l_sole`?"],
+        ),
+        ("'left'", "'hand'", &["line", "hand", "`right` or `left`"]),
+        ("'left'", "'right'", &["mine.toml", "foot = \"left\""]),
+        ("0.05", "0.0", &["soles[1].half_width_m = 0", "above 0"]),
+        ("half_width_m", "width_m", &["line", "width_m", "half_width_m"]),
+    ];
+    for (from, to, words) in expectations {
+        let message = fails(from, to);
+        for word in words {
+            assert!(
+                message.contains(word),
+                "`{to}`: `{word}` is missing in: {message}"
+            );
+        }
+    }
+}
+
+#[test]
 fn limits_can_be_replaced_and_are_checked() {
     let limits = |text: &str| {
         message(
@@ -300,7 +343,7 @@ fn robots_come_from_urdf_files_too() {
     std::fs::create_dir_all(&folder).unwrap();
     let suite = |path: &str| {
         format!(
-            "id = 'mine'\ntitle = ''\nanalysis = ''\ndt_s = 0.01\ncom_tolerance_m = 1.0\n[problem]\n\
+            "id = 'mine'\ntitle = ''\nanalysis = ''\ndt_s = 0.01\nsoft_tolerance_m = 1.0\n[problem]\n\
              robot = {{ urdf-file = {{ path = '{path}', root = 'fixed' }} }}\nboundary = {{ kind = 'box' }}\n\
              [[problem.tasks]]\nname = 'joints'\ntrack = 'posture'\npriority = {{ compromised = {{ uniform = 1.0 }} }}\n\
              [starts.zero]\n[[scenarios]]\nid = 'wave'\nduration_s = 0.1\nstart = 'zero'\n\

@@ -31,8 +31,8 @@ pub fn readme_table(rows: &[Row]) -> String {
 const HEADER: [&str; 11] = [
     "method",
     "n",
-    "squat: CoM rms (mm)",
-    "stretch: CoM rms (mm)",
+    "squat: soft rms (mm)",
+    "stretch: soft rms (mm)",
     "stretch: peak velocity (rad/s)",
     "stretch: exit (s)",
     "asymmetric C",
@@ -54,7 +54,7 @@ fn cells(group: &[&Labelled<'_>]) -> Vec<String> {
     let millimetres = |m: &Option<Metrics>| {
         number(
             m.as_ref()
-                .and_then(|m| m.quality.com_error_rms_m)
+                .and_then(|m| m.quality.worst_soft_rms_m())
                 .map(|e| e * 1e3),
         )
     };

@@ -36,9 +36,10 @@ const TERMINAL: [(&str, usize); 12] = [
 
 /// What the columns mean, in as many columns.
 const LEGEND: &str = "
-rms, max: centre-of-mass error. hard: largest miss of a hard task (m or rad). exit: when both knees
-left the straight leg for good. majors: outer iterations per step. us: median step time; x ik1: the
-same relative to ik1. g<=0: inside the ellipse, whatever boundary was given. ok: survived.
+rms, max: distance of the compromised task that misses its point most. hard: largest miss of a hard
+task (m or rad). exit: when both knees left the straight leg for good. majors: outer iterations per
+step. us: median step time; x ik1: the same relative to ik1. g<=0: inside the ellipse, whatever
+boundary was given. ok: survived.
 ";
 
 /// A table that fits [`TERMINAL_WIDTH`] columns.
@@ -149,8 +150,8 @@ fn line(scenario: &str, runs: &[&Labelled<'_>]) -> Line {
         method: first.map_or(String::new(), |r| r.label.clone()),
         n: first.and_then(|r| r.n).map_or(NONE.to_owned(), |n| n.to_string()),
         values: vec![
-            number(worst(&|m| m.quality.com_error_rms_m.map(|e| e * 1e3))),
-            number(worst(&|m| m.quality.com_error_max_m.map(|e| e * 1e3))),
+            number(worst(&|m| m.quality.worst_soft_rms_m().map(|e| e * 1e3))),
+            number(worst(&|m| m.quality.worst_soft_max_m().map(|e| e * 1e3))),
             worst(&|m| (!m.quality.hard_error_max.is_empty()).then(|| hard_max(&m.quality)))
                 .map_or(NONE.to_owned(), |h| format!("{h:.1e}")),
             seconds(worst(&|m| m.quality.singularity_exit_s)),

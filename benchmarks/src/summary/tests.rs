@@ -105,6 +105,52 @@ fn the_summary_has_a_table_and_the_analysis_per_suite() {
     assert!(tables.clone().all(|l| columns(l) == HEADER.len() + 1), "{text}");
 }
 
+/// Rows recorded before there were maxima per task have the centre of mass in their place.
+#[test]
+fn the_soft_columns_take_the_worst_point_and_read_older_rows() {
+    let mut run = row("ik1", None, "coman/squat", "A");
+    let soft = |run: &Row| {
+        let cells = cells(&labelled(std::slice::from_ref(run))[0]);
+        (cells[3].clone(), cells[4].clone())
+    };
+    let pair = |rms: &str, max: &str| (rms.to_owned(), max.to_owned());
+    assert_eq!(soft(&run), pair("1.50", "2.20"));
+    let quality = quality_of(&mut run);
+    quality.soft_error_max.insert("com".to_owned(), 2.2e-3);
+    (quality.soft_error_rms_m, quality.soft_error_max_m) = (Some(7e-3), Some(9e-3));
+    assert_eq!(soft(&run), pair("7.00", "9.00"));
+    // A compromised orientation alone places no point, whatever the hard centre of mass does.
+    let quality = quality_of(&mut run);
+    (quality.soft_error_rms_m, quality.soft_error_max_m) = (None, None);
+    assert_eq!(soft(&run), pair(NONE, NONE));
+}
+
+fn quality_of(run: &mut Row) -> &mut Quality {
+    &mut run.metrics.as_mut().unwrap().quality
+}
+
+/// The published rows were recorded before the fields of today: they are read, and the README holds their table.
+#[test]
+fn the_published_rows_give_the_table_of_the_readme() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let rows = read_rows(&root.join("results/2026-11-22-coman").join(ROWS_FILE))
+        .unwrap()
+        .rows;
+    let readme = std::fs::read_to_string(root.join("README.md")).unwrap();
+    assert!(readme.contains(&readme_table(&rows)), "{}", readme_table(&rows));
+    for row in &rows {
+        let Some(metrics) = &row.metrics else { continue };
+        assert_eq!(
+            metrics.quality.worst_soft_rms_m(),
+            metrics.quality.com_error_rms_m
+        );
+        assert_eq!(
+            metrics.quality.worst_soft_max_m(),
+            metrics.quality.com_error_max_m
+        );
+    }
+}
+
 #[test]
 fn the_readme_table_has_one_line_per_method_and_budget() {
     let rows = full();

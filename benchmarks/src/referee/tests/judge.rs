@@ -22,6 +22,7 @@ fn judge_at_rest(problem: &Arc<Problem>, x: &[f64], q: &[Vec<f64>], dt_s: f64) -
         q,
         targets: &targets,
         phases: &ONLY,
+        support: &[],
     })
 }
 
@@ -63,10 +64,16 @@ fn errors_of_the_centre_of_mass() {
         q: &q,
         targets: &targets,
         phases: &ONLY,
+        support: &[],
     });
     close(quality.com_error_rms_m.unwrap(), (50.0_f64 / 3.0).sqrt());
     assert_eq!(quality.com_error_max_m, Some(5.0));
     assert_eq!(quality.soft_error_rms["com"], quality.com_error_rms_m.unwrap());
+    assert_eq!(quality.soft_error_rms_m, quality.com_error_rms_m);
+    assert_eq!(
+        (quality.soft_error_max_m, quality.soft_error_max["com"]),
+        (Some(5.0), 5.0)
+    );
     close(quality.com_rate_error_rms_m_s.unwrap(), 2.0_f64.sqrt());
     assert_eq!((quality.hard_error_max_m, quality.hard_error_max.len()), (0.0, 0));
     assert!(!quality.survived, "5 m is above the tolerance");
@@ -88,6 +95,7 @@ fn no_centre_of_mass_task_means_no_such_numbers() {
         (None, None)
     );
     assert!(quality.survived);
+    assert_eq!((quality.soft_error_rms_m, quality.soft_error_max_m), (None, None));
 }
 
 #[test]
@@ -157,6 +165,40 @@ fn compromised_tasks_by_name() {
     close(quality.soft_error_rms["tool_m"], 0.5);
     close(quality.soft_error_rms["tool_rad"], 0.25);
     close(quality.soft_error_rms["rest"], 0.125);
+    assert!(quality.soft_error_max.keys().eq(quality.soft_error_rms.keys()));
+    close(quality.soft_error_max["tool_rad"], 0.25);
+    assert_eq!(
+        (quality.soft_error_rms_m, quality.soft_error_max_m),
+        (Some(0.5), Some(0.5)),
+        "angles do not count"
+    );
+}
+
+#[test]
+fn the_compromised_point_that_is_missed_most_decides_survival() {
+    let robot = slides();
+    let (base, tip) = (frame(&robot, "base"), frame(&robot, "tip"));
+    let tasks = vec![
+        ("near", Track::Position(base), soft()),
+        ("hand", Track::Pose(tip), soft()),
+        ("turned", Track::Orientation(base), soft()),
+    ];
+    let problem = problem(robot, tasks, Boundary::None);
+    // Off by 3 cm at all samples; off by 0 and then by `reach` in z and y; 2 rad off, which is no distance.
+    let x = [0.03, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0];
+    let judged = |reach: f64| {
+        let q = [vec![0.0, 0.0], vec![0.8 * reach, 0.6 * reach]];
+        judge_at_rest(&problem, &x, &q, 0.5)
+    };
+    let sound = judged(0.0799);
+    assert!(sound.survived && !judged(0.0801).survived);
+    close(sound.soft_error_max["hand_m"], 0.0799);
+    close(sound.soft_error_max["near"], 0.03);
+    close(sound.soft_error_max["turned"], 2.0);
+    close(sound.soft_error_max_m.unwrap(), 0.0799);
+    close(sound.soft_error_rms_m.unwrap(), 0.0799 * 0.5_f64.sqrt());
+    close(judged(0.04).soft_error_rms_m.unwrap(), 0.03);
+    assert_eq!(sound.com_error_max_m, None);
 }
 
 #[test]
@@ -186,6 +228,7 @@ fn tasks_count_in_the_phases_they_belong_to() {
         q: &q,
         targets: &targets,
         phases: &phases,
+        support: &[],
     });
     assert_eq!(
         (quality.hard_error_max["tip_m"], quality.hard_error_max["com_m"]),
@@ -313,6 +356,7 @@ fn exit_of(knee: [f64; 7]) -> Option<f64> {
             q: &q,
             targets: &targets,
             phases: &ONLY,
+            support: &[],
         })
         .singularity_exit_s
 }
@@ -358,6 +402,7 @@ fn torques_are_averaged_from_one_second_on() {
         q: &q,
         targets: &targets,
         phases: &ONLY,
+        support: &[],
     };
     let asked = Referee::new(
         &problem,
@@ -522,6 +567,7 @@ fn runs_that_do_not_fit_the_problem_do_not_survive() {
         q: &q,
         targets: &targets,
         phases: &ONLY,
+        support: &[],
     };
     let judged = |run: Run<'_>| referee(&problem).judge(&run);
     assert!(
@@ -573,10 +619,10 @@ fn specifications_are_checked() {
         ..plain_spec()
     });
     assert!(matches!(frame, RefereeError::Frame { frame: 999, .. }));
-    for com_tolerance_m in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+    for soft_tolerance_m in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(
             fails(JudgeSpec {
-                com_tolerance_m,
+                soft_tolerance_m,
                 ..plain_spec()
             }),
             RefereeError::Tolerance(_)

@@ -3,6 +3,7 @@
 #![allow(clippy::float_cmp, reason = "hand-computed values are chosen to be exact")]
 #![allow(clippy::print_stdout, reason = "a test that is skipped says why")]
 
+mod balance;
 mod certificate;
 mod judge;
 mod kinematics;
@@ -229,9 +230,10 @@ fn shoot_out(boundary: Boundary) -> Arc<Problem> {
 
 fn plain_spec() -> JudgeSpec {
     JudgeSpec {
-        com_tolerance_m: 0.08,
+        soft_tolerance_m: 0.08,
         exit_joints: Vec::new(),
         torque_supports: Vec::new(),
+        soles: Vec::new(),
     }
 }
 
