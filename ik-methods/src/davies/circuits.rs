@@ -78,8 +78,19 @@ pub(super) struct Quality {
 pub(super) struct Damping {
     pub(super) hard: f64,
     pub(super) soft: f64,
+    /// Least pivot from which compromised rows are not damped.
+    pub(super) soft_threshold: f64,
     /// λ of hard rows that are dependent, at least.
     pub(super) singular: f64,
+}
+
+impl Damping {
+    /// λ of compromised rows whose least pivot is this part of the largest: it fades in towards the singularity
+    /// (Nakamura & Hanafusa 1986), so that nothing is distorted away from it.
+    fn soft_at(self, pivot: f64) -> f64 {
+        let near = pivot / self.soft_threshold;
+        self.soft * (1.0 - near * near).max(0.0).sqrt()
+    }
 }
 
 impl Circuits {
@@ -303,7 +314,7 @@ impl Group {
     ) -> Quality {
         self.fill_hard(at, root, place);
         let [hard, soft] = &mut self.stages;
-        let independent = hard.factorise();
+        let independent = hard.factorise() > 0.0;
         let lambda = if independent {
             damping.hard
         } else {
@@ -323,8 +334,8 @@ impl Group {
                 self.joints.len(),
             );
             hard.follow(&mut self.soft_rows, soft);
-            soft.factorise();
-            soft.decide(damping.soft);
+            let pivot = soft.factorise();
+            soft.decide(damping.soft_at(pivot));
             let (free, costed) = hard.left();
             soft.finish(&mut u[..free], &mut x[..costed]);
         }

@@ -85,11 +85,18 @@ impl Stage {
         &self.rows[..self.height * self.width]
     }
 
-    /// Factorises both parts. True if C has full rank below F.
-    pub(super) fn factorise(&mut self) -> bool {
+    /// Factorises both parts. Returns the least pivot of C below F as part of the largest, 1 without rows: never less
+    /// than the inverse of its condition number, and 0 where its rows are dependent.
+    pub(super) fn factorise(&mut self) -> f64 {
         self.eliminate_free();
         self.triangulate();
-        self.rank == (self.height - self.free_rank).min(self.costed)
+        let full = (self.height - self.free_rank).min(self.costed);
+        let pivot = |k: usize| self.rows[(self.free_rank + k) * self.width + self.free + k].abs();
+        match full {
+            0 => 1.0,
+            _ if self.rank < full => 0.0,
+            _ => pivot(full - 1) / pivot(0),
+        }
     }
 
     /// F upper triangular by reflections from the left, columns pivoted by length.
@@ -431,7 +438,7 @@ mod tests {
                 for damping in [0.0, 1e-3, 0.3] {
                     let case = case(seed, m, f, n);
                     let mut stage = stage(&case);
-                    assert!(stage.factorise());
+                    assert!(stage.factorise() > 0.0);
                     stage.decide(damping);
                     let (u, x) = answer(&stage, f, n);
                     let expected = oracle(&case, damping);
@@ -455,7 +462,7 @@ mod tests {
             let copy = case.c.row(1) * 2.0;
             case.c.row_mut(4).copy_from(&copy);
             let mut stage = stage(&case);
-            assert!(!stage.factorise());
+            assert_eq!(stage.factorise(), 0.0);
             let missed = stage.decide(0.0);
             let (_, x) = answer(&stage, 0, 7);
             assert!((&x - oracle(&case, 0.0)).amax() < 1e-8);
