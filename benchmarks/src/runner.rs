@@ -234,7 +234,7 @@ fn judged_run<'a>(case: &'a Case, played: &'a Played) -> Run<'a> {
         q: &played.q,
         targets: case.samples.judged(),
         phases: &[WHOLE],
-        support: &[],
+        support: &case.support,
     }
 }
 

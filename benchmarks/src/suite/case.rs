@@ -1,11 +1,12 @@
 //! A case: one scenario of a suite with everything built, checked and sampled. What can be wrong is found here, before
 //! anything runs or is written.
 
+use super::closure::close_loops;
 use super::problem_spec::{LimitsSpec, ProblemSpec, frame};
-use super::{ScenarioSpec, SoleSpec, StartSpec, Suite};
+use super::{Meet, ScenarioSpec, SoleSpec, StartSpec, Suite};
 use crate::error::{InputError, finite};
 use crate::referee::{JudgeSpec, Referee, Sole};
-use crate::trajectory::{Grid, Rates, Samples, Trajectory};
+use crate::trajectory::{Gait, Grid, Rates, Samples, Support, Trajectory};
 use ik_core::boundary::Boundary;
 use ik_core::problem::Problem;
 use ik_core::robot::{Robot, Root};
@@ -44,6 +45,10 @@ pub struct Case {
     pub suite_dt_s: f64,
     /// Targets.
     pub samples: Samples,
+    /// Targets as functions of time.
+    pub trajectory: Trajectory,
+    /// Which feet carry the robot at the samples k = 0 … N: both, unless it walks.
+    pub support: Vec<Support>,
     /// Judges the runs.
     pub referee: Referee,
     /// Remarks for the rows.
@@ -68,20 +73,20 @@ impl Case {
                 suite.starts.keys(),
             ));
         };
-        let q_start = start.build(
-            problem.robot(),
-            &format!("{}: starts.{}", suite.source, scenario.start),
-        )?;
+        let start_place = format!("{}: starts.{}", suite.source, scenario.start);
+        let guess = start.build(problem.robot(), &start_place)?;
         let dt_s = variation.dt_s.unwrap_or(suite.dt_s);
         let grid = Grid::new(dt_s, scenario.duration_s, spec.preview_s, &place)?;
         check_polygon(&spec.boundary, dt_s, &place)?;
-        let trajectory = Trajectory::new(
-            &problem,
-            &q_start,
-            &scenario.motion,
-            &suite.source,
-            &motion_field(index),
-        )?;
+        let trajectory = trajectory(suite, index, &problem, &guess, grid)?;
+        let q_start = match start.meet {
+            Meet::Nothing => guess,
+            Meet::Targets => {
+                let met = close_loops(&spec, &trajectory, &guess, &place, &start_place)?;
+                check_limits(problem.robot(), &met, &start_place)?;
+                met
+            }
+        };
         let samples = Samples::new(&problem, &trajectory, grid, spec.rates, &place)?;
         let referee = judge(suite, &problem)?;
         let notes = match spec.rates {
@@ -99,10 +104,31 @@ impl Case {
             dt_s,
             suite_dt_s,
             samples,
+            support: trajectory.support(grid),
+            trajectory,
             referee,
             notes,
         })
     }
+}
+
+/// The targets of scenario `index` for a robot that starts at `guess`.
+fn trajectory(
+    suite: &Suite,
+    index: usize,
+    problem: &Problem,
+    guess: &[f64],
+    grid: Grid,
+) -> Result<Trajectory, InputError> {
+    let (scenario, source) = (&suite.scenarios[index], &suite.source);
+    let field = |name: &str| format!("scenarios[{index}].{name}");
+    let gait = match &scenario.gait {
+        Some(gait) => Some(Gait::new(gait, problem, source, &field("gait"))?),
+        None => None,
+    };
+    let trajectory = Trajectory::new(problem, guess, gait, &scenario.motion, source, &field("motion"))?;
+    trajectory.check_reach(grid, source, &field("gait"))?;
+    Ok(trajectory)
 }
 
 impl Variation {
@@ -120,10 +146,6 @@ impl Variation {
         }
         label
     }
-}
-
-fn motion_field(index: usize) -> String {
-    format!("scenarios[{index}].motion")
 }
 
 fn varied_problem(

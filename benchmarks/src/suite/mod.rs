@@ -1,6 +1,7 @@
 //! Suites: scenarios for one problem, who competes in them, and how to read the result, as TOML.
 
 mod case;
+mod closure;
 mod lineup;
 mod problem_spec;
 
@@ -11,7 +12,7 @@ pub use problem_spec::{LimitsSpec, PrioritySpec, ProblemSpec, RobotSpec, TaskSpe
 
 use crate::error::InputError;
 use crate::referee::Foot;
-use crate::trajectory::MotionSpec;
+use crate::trajectory::{GaitSpec, MotionSpec};
 use ik_core::boundary::Boundary;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -82,6 +83,20 @@ pub struct StartSpec {
     /// Joints by name (rad or m); those not named are 0.
     #[serde(default)]
     pub joints: BTreeMap<String, f64>,
+    /// What the configuration is made to meet.
+    #[serde(default)]
+    pub meet: Meet,
+}
+
+/// What a start configuration is made to meet before the run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Meet {
+    /// Nothing: it stays as given.
+    #[default]
+    Nothing,
+    /// The targets of all tasks at t = 0, from the given configuration as guess.
+    Targets,
 }
 
 /// A motion from a start.
@@ -97,6 +112,9 @@ pub struct ScenarioSpec {
     pub duration_s: f64,
     /// Name of the start.
     pub start: String,
+    /// A walk: the targets of its tasks, in place of their values at the start.
+    #[serde(default)]
+    pub gait: Option<GaitSpec>,
     /// The terms that move the targets; tasks without one keep their value at the start.
     #[serde(default)]
     pub motion: Vec<MotionSpec>,
@@ -131,6 +149,12 @@ pub const EMBEDDED: &[(&str, &str)] = &[
         include_str!("../../suites/coman/regulator.toml"),
     ),
     ("coman/posture", include_str!("../../suites/coman/posture.toml")),
+    ("bioloid/gait", include_str!("../../suites/bioloid/gait.toml")),
+    (
+        "bioloid/com-sway",
+        include_str!("../../suites/bioloid/com-sway.toml"),
+    ),
+    ("bioloid/squat", include_str!("../../suites/bioloid/squat.toml")),
 ];
 
 impl Suite {

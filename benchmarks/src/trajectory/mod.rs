@@ -1,15 +1,18 @@
-//! Target trajectories: sums of analytic terms on single components of tasks, sampled once on the control grid.
+//! Target trajectories: sums of analytic terms on single components of tasks, and a walk if there is one, sampled once on
+//! the control grid.
 
 mod gait;
 mod samples;
 mod shape;
+mod spline;
 mod targets;
 #[cfg(test)]
 mod tests;
 
-pub use gait::Support;
+pub use gait::{Gait, GaitSpec, GaitTasks, HeightKnot, Support, Swing, Walk};
 pub use samples::{Grid, Rates, Samples};
 pub use shape::Shape;
+pub use spline::{CubicSpline, Curve, KnotError};
 pub use targets::{MotionSpec, Trajectory};
 
-pub(crate) use targets::task_values;
+pub(crate) use targets::{row_name, task_values};

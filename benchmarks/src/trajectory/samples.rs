@@ -1,6 +1,6 @@
 //! Sampling: one flat buffer of `[x | ẋ]` per scenario, of which every control step sees a part.
 
-use super::targets::{Trajectory, component_names};
+use super::targets::{Trajectory, row_name};
 use crate::error::InputError;
 use ik_core::problem::Problem;
 use ik_core::spatial::{rpy, so3};
@@ -100,7 +100,8 @@ impl Grid {
         })
     }
 
-    fn time(&self, k: usize) -> f64 {
+    /// Time of sample k (s).
+    pub fn time(&self, k: usize) -> f64 {
         #[allow(clippy::cast_precision_loss, reason = "at most 1e6 samples")]
         let k = k as f64;
         k * self.dt_s
@@ -181,14 +182,7 @@ fn check_finite(
     let Some(row) = (0..value.len()).find(|&i| !(value[i].is_finite() && rate[i].is_finite())) else {
         return Ok(());
     };
-    let index = problem
-        .slots()
-        .iter()
-        .rposition(|s| s.xdot <= row)
-        .expect("slots start at 0");
-    let task = &problem.tasks()[index];
-    let component = component_names(problem.robot(), &task.track)[row - problem.slots()[index].xdot];
-    let field = format!("target {}.{component} at t = {t} s", task.name);
+    let field = format!("target {} at t = {t} s", row_name(problem, row));
     let found = format!("{} with rate {}", value[row], rate[row]);
     Err(InputError::value(place, &field, found, "finite numbers"))
 }

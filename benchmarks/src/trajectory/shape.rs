@@ -1,6 +1,6 @@
 //! The shapes trajectories are made of, each with its exact derivative.
 //!
-//! The functions are those of the Coman experiments (`bump` and `ss`); units are those of the component they act on.
+//! The functions are those of the Coman experiments (`bump` and `ss`) and a plain sine; units are those of the component they act on.
 
 use crate::error::{InputError, finite, positive};
 use serde::{Deserialize, Serialize};
@@ -33,6 +33,13 @@ pub enum Shape {
         /// T (s).
         period_s: f64,
     },
+    /// `A sin(2πt/T)`: an oscillation that begins at full speed.
+    Sine {
+        /// A (m or rad).
+        amplitude: f64,
+        /// T (s).
+        period_s: f64,
+    },
     /// A constant added to the value at the start.
     Offset {
         /// The constant (m or rad).
@@ -56,6 +63,7 @@ impl Shape {
                 rise_s,
                 period_s,
             } => amplitude * smooth_step(t / rise_s) * (TAU * t / period_s).sin(),
+            Self::Sine { amplitude, period_s } => amplitude * (TAU * t / period_s).sin(),
             Self::Offset { value } | Self::Hold { value } => value,
         }
     }
@@ -74,6 +82,7 @@ impl Shape {
                 let fading = smooth_step_slope(t / rise_s) / rise_s * sine;
                 amplitude * (fading + smooth_step(t / rise_s) * TAU / period_s * cosine)
             }
+            Self::Sine { amplitude, period_s } => amplitude * TAU / period_s * (TAU * t / period_s).cos(),
             Self::Offset { .. } | Self::Hold { .. } => 0.0,
         }
     }
@@ -103,6 +112,10 @@ impl Shape {
                 time("smooth-sine.rise_s", rise_s)?;
                 time("smooth-sine.period_s", period_s)
             }
+            Self::Sine { amplitude, period_s } => {
+                number("sine.amplitude", amplitude)?;
+                time("sine.period_s", period_s)
+            }
             Self::Offset { value } => number("offset.value", value),
             Self::Hold { value } => number("hold.value", value),
         }
@@ -124,7 +137,7 @@ fn smooth_step_slope(u: f64) -> f64 {
 mod tests {
     use super::*;
 
-    const SHAPES: [Shape; 5] = [
+    const SHAPES: [Shape; 6] = [
         Shape::Bump {
             amplitude: 0.08,
             period_s: 2.0,
@@ -140,6 +153,10 @@ mod tests {
         },
         Shape::Offset { value: 0.3 },
         Shape::Hold { value: -0.7 },
+        Shape::Sine {
+            amplitude: 0.03,
+            period_s: 2.0,
+        },
     ];
 
     #[test]
@@ -163,6 +180,9 @@ mod tests {
         near(SHAPES[1].value(0.75), 0.0325);
         near(SHAPES[1].value(9.0), 0.065);
         near(SHAPES[2].value(0.75), -0.2 * 0.896_484_375);
+        near(SHAPES[5].value(0.0), 0.0);
+        near(SHAPES[5].value(0.5), 0.03);
+        near(SHAPES[5].value(1.5), -0.03);
     }
 
     #[test]
@@ -188,5 +208,11 @@ mod tests {
             .is_err()
         );
         assert!(Shape::Offset { value: f64::INFINITY }.check("", "").is_err());
+        let still = Shape::Sine {
+            amplitude: 1.0,
+            period_s: 0.0,
+        };
+        let message = still.check("s.toml", "shape").unwrap_err().to_string();
+        assert!(message.contains("shape.sine.period_s = 0"), "{message}");
     }
 }

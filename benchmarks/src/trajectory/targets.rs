@@ -4,6 +4,8 @@
 //! single components, and the rates of the components are exact. How the problem writes orientations matters only when
 //! a trajectory is sampled.
 
+use super::gait::{Gait, Support};
+use super::samples::Grid;
 use super::shape::Shape;
 use crate::error::{InputError, finite};
 use ik_core::kinematics::{Page, forward};
@@ -43,18 +45,20 @@ struct Term {
 #[derive(Clone, Debug)]
 pub struct Trajectory {
     base: Vec<f64>,
+    pub(super) gait: Option<Gait>,
     terms: Vec<Term>,
 }
 
 impl Trajectory {
-    /// The motion of a robot that starts at `q_start` (length nq). `place` and `field` (the path of the list of terms) go
-    /// into messages.
+    /// The motion of a robot that starts at `q_start` (length nq): the walk, elsewhere the values at the start, and the
+    /// terms on top of both. `place` and `field` (the path of the list of terms) go into messages.
     ///
     /// # Errors
     /// An unknown task or component, a number that cannot be, two constants for one component.
     pub fn new(
         problem: &Problem,
         q_start: &[f64],
+        gait: Option<Gait>,
         motion: &[MotionSpec],
         place: &str,
         field: &str,
@@ -68,6 +72,10 @@ impl Trajectory {
                 terms.push(term);
                 continue;
             };
+            if gait.as_ref().is_some_and(|gait| gait.moves(term.row)) {
+                let found = "a hold on what the gait moves";
+                return Err(InputError::value(place, &field, found, "any other shape"));
+            }
             if held.contains(&term.row) {
                 return Err(InputError::value(
                     place,
@@ -79,12 +87,47 @@ impl Trajectory {
             held.push(term.row);
             base[term.row] = value;
         }
-        Ok(Self { base, terms })
+        Ok(Self { base, gait, terms })
+    }
+
+    /// The walk in it.
+    pub fn gait(&self) -> Option<&Gait> {
+        self.gait.as_ref()
+    }
+
+    /// Which feet carry the robot at the samples k = 0 … N: both without a walk.
+    pub fn support(&self, grid: Grid) -> Vec<Support> {
+        let at = |k| match &self.gait {
+            Some(gait) => gait.support(grid.time(k)),
+            None => Support::Both,
+        };
+        (0..=grid.steps).map(at).collect()
+    }
+
+    /// Checks that every limb of the walk reaches its targets at all samples; `place` and `field` (the path of the walk)
+    /// go into the message.
+    ///
+    /// # Errors
+    /// The limb and the time that miss most, by how much, and what to change.
+    pub fn check_reach(&self, grid: Grid, place: &str, field: &str) -> Result<(), InputError> {
+        let Some(gait) = &self.gait else {
+            return Ok(());
+        };
+        let times = (0..=grid.steps + grid.preview).map(|k| grid.time(k));
+        gait.check_reach(self, times, place, field)
+    }
+
+    /// Number of task rows.
+    pub(super) fn rows(&self) -> usize {
+        self.base.len()
     }
 
     /// Writes the values at `t` (s), one per task row (m, or rad with orientations as roll, pitch, yaw).
     pub fn value_into(&self, t: f64, out: &mut [f64]) {
         out.copy_from_slice(&self.base);
+        if let Some(gait) = &self.gait {
+            gait.value_into(t, out);
+        }
         for term in self.active(t) {
             out[term.row] += term.shape.value(t - term.from_s);
         }
@@ -93,6 +136,9 @@ impl Trajectory {
     /// Writes the exact time derivatives of the values at `t` (s).
     pub fn rate_into(&self, t: f64, out: &mut [f64]) {
         out.fill(0.0);
+        if let Some(gait) = &self.gait {
+            gait.rate_into(t, out);
+        }
         for term in self.active(t) {
             out[term.row] += term.shape.rate(t - term.from_s);
         }
@@ -151,13 +197,25 @@ fn term(problem: &Problem, spec: &MotionSpec, place: &str, field: &str) -> Resul
 }
 
 /// Names of the rows of a task, in their order.
-pub(crate) fn component_names<'a>(robot: &'a Robot, track: &Track) -> Vec<&'a str> {
+fn component_names<'a>(robot: &'a Robot, track: &Track) -> Vec<&'a str> {
     match track {
         Track::Position(_) | Track::CentreOfMass => vec!["x", "y", "z"],
         Track::Orientation(_) => vec!["roll", "pitch", "yaw"],
         Track::Pose(_) => vec!["x", "y", "z", "roll", "pitch", "yaw"],
         Track::Posture => robot.coordinates().iter().map(|c| c.name.as_str()).collect(),
     }
+}
+
+/// Name of a task row: `task.component`.
+pub(crate) fn row_name(problem: &Problem, row: usize) -> String {
+    let index = problem
+        .slots()
+        .iter()
+        .rposition(|s| s.xdot <= row)
+        .expect("slots start at 0");
+    let task = &problem.tasks()[index];
+    let component = component_names(problem.robot(), &task.track)[row - problem.slots()[index].xdot];
+    format!("{}.{component}", task.name)
 }
 
 /// Values of all tasks at `q` (length nq), in plain coordinates.
