@@ -536,3 +536,136 @@ fn a_redundant_robot_on_a_fixed_foot_moves_by_its_pseudo_inverse() {
     println!("{compared} rates, worst relative difference {worst:e}");
     assert!(compared > 2000 && worst < 1e-12, "{compared} {worst:e}");
 }
+
+/// Bioloid with bent limbs, both feet flat, the waist 0.155 m over the ground.
+fn stance(x: f64) -> Vec<f64> {
+    let leg = [0.0, 0.0, -0.6486555, 1.2904366, -0.6417811, 0.0];
+    let arm = [-0.3535033, -0.6403979, 1.5673627];
+    let mut q = vec![x, 0.0, 0.155, 0.0, 0.0, 0.0, 1.0];
+    q.extend(leg.iter().chain(&leg).chain(&arm));
+    q.extend(arm.iter().map(|a| -a));
+    q
+}
+
+#[test]
+fn circuits_at_their_own_points_are_as_well_conditioned_anywhere() {
+    let robot = bioloid();
+    let problem = problem(&robot, &gait_tasks(&robot, Priority::Hard));
+    let condition =
+        |x: f64, point| Network::new(&problem, WHOLE, &stance(x), point, OrientationRates::Euler).condition();
+    let here = condition(0.0, ReferencePoint::Task);
+    for x in [1.0, 10.0, 100.0] {
+        let there = condition(x, ReferencePoint::Task);
+        assert!((there / here - 1.0).abs() < 0.01, "{x} m: {there} against {here}");
+    }
+    // Written at a fixed origin, as the paper does, it grows with the square of the distance.
+    let far = [0.0, 1.0, 10.0, 100.0].map(|x| condition(x, ReferencePoint::Origin));
+    println!("own points {here:.1}; origin {far:.1?}");
+    assert!((20.0..100.0).contains(&here));
+    assert!(far[2] > 1e3 && far[3] > 1e5);
+    assert!((far[3] / far[2] / 100.0 - 1.0).abs() < 0.05, "not a square");
+}
+
+#[test]
+fn both_points_give_the_same_rates() {
+    let robot = bioloid();
+    let problem = problem(&robot, &gait_tasks(&robot, Priority::Hard));
+    let q = stance(10.0);
+    let rates = DVector::from_vec(numbers(5, 24));
+    let solved = |point| {
+        let network = Network::new(&problem, WHOLE, &q, point, OrientationRates::Euler);
+        network
+            .secondary()
+            .full_piv_lu()
+            .solve(&(network.primary() * &rates))
+            .unwrap()
+    };
+    let (a, b) = (solved(ReferencePoint::Task), solved(ReferencePoint::Origin));
+    assert!((&a - &b).amax() < 1e-9 * a.amax());
+}
+
+#[test]
+fn straight_limbs_are_damped_and_flagged() {
+    let robot = bioloid();
+    let problem = problem(&robot, &gait_tasks(&robot, Priority::Hard));
+    let q = robot.neutral();
+    // Straight knees and elbows: one rank per limb is lost.
+    let network = Network::new(
+        &problem,
+        WHOLE,
+        &q,
+        ReferencePoint::Task,
+        OrientationRates::AngularVelocity,
+    );
+    assert_eq!(Network::rank(&network.secondary()), 20);
+    let x = targets(&problem, &q);
+    let mut to = x.clone();
+    // The waist sinks by 1 mm, the feet stay: only bending the knees could do it, and their rate is exactly lost.
+    let waist = problem.slots()[2].x;
+    to[waist + 2] -= 1e-3;
+    for damping in [0.0, 1e-2] {
+        let (v, said) = drive(&problem, &format!("damping = {damping:?}"), &q, &x, &to, 1.0);
+        assert!(v.iter().all(|v| v.is_finite()));
+        let knee = v[6 + robot.coordinate("r_knee_pitch").unwrap()];
+        assert!(knee.abs() < 1e-12, "{knee}");
+        let Termination::Damped { residual } = said else {
+            panic!("{said:?}");
+        };
+        // Both feet and both hands (which hang from the waist and would have to rise by 1 mm) miss 1 mm.
+        assert!((residual - 2e-3).abs() < 1e-6, "{residual}");
+    }
+}
+
+#[test]
+fn the_rule_of_four_evaluations_is_of_fourth_order_on_a_turning_root() {
+    // The waist turns and sways, the feet stand: an open loop integrated with analytic rates.
+    let robot = bioloid();
+    let problem = problem(&robot, &gait_tasks(&robot, soft()));
+    let start = stance(0.0);
+    let rest = targets(&problem, &start);
+    let (nx, nxdot) = (problem.nx(), problem.nxdot());
+    // x, ẋ at t: the waist turns by exp(φ(t)) with φ = a(t) n, whose angular velocity is ȧ n.
+    let axis = Vector3::new(0.4, -0.6, 0.69).normalize();
+    let sample = |t: f64| {
+        let (mut x, mut xdot) = (rest.clone(), vec![0.0; nxdot]);
+        let slot = problem.slots()[2];
+        let (a, adot) = (0.3 * (1.0 - (2.0 * t).cos()), 0.6 * (2.0 * t).sin());
+        let turn = so3::exp_quaternion(&(axis * a));
+        x[slot.x + 1] += 0.02 * (1.0 - (3.0 * t).cos());
+        xdot[slot.xdot + 1] = 0.06 * (3.0 * t).sin();
+        x[slot.x + 3..slot.x + 7].copy_from_slice(turn.coords.as_slice());
+        for k in 0..3 {
+            xdot[slot.xdot + 3 + k] = axis[k] * adot;
+        }
+        [x, xdot].concat()
+    };
+    let error = |steps: usize| {
+        let text = "correction = 0.0\nintegrator = 'rk4'\nrates = 'analytic'";
+        let contestant = method("davies").unwrap().build(&text.parse().unwrap()).unwrap();
+        let mut driver = Driver::new(&*contestant.formulation, &problem).unwrap();
+        let (mut q, dt_s) = (start.clone(), 0.8 / steps as f64);
+        for k in 0..steps {
+            let data = [sample(dt_s * k as f64), sample(dt_s * (k + 1) as f64)].concat();
+            let input = StepInput {
+                q_prev: &q,
+                v_prev: &vec![0.0; robot.nv()],
+                dt_s,
+                phase: WHOLE,
+                targets: Window::new(&data, nx, nxdot).unwrap(),
+                gains: &[],
+            };
+            let majors = driver.majors();
+            assert_eq!(driver.step(&input, majors).0, Termination::Stepped);
+            q.clone_from(&driver.solution().q);
+        }
+        let (reached, wanted) = (targets(&problem, &q), sample(0.8));
+        let feet = &problem.slots()[..3];
+        let positions = feet.iter().flat_map(|s| s.x..s.x + 3);
+        positions
+            .map(|i| (reached[i] - wanted[i]).abs())
+            .fold(0.0, f64::max)
+    };
+    let (coarse, fine) = (error(40), error(80));
+    println!("{coarse:e} {fine:e}, ratio {}", coarse / fine);
+    assert!(coarse / fine > 13.0 && fine < 1e-6, "{coarse:e} {fine:e}");
+}

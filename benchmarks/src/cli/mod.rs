@@ -2,6 +2,7 @@
 //!
 //! Exit code 0: done; 2: bad input, one message, nothing written; 1: the system failed (a disk, for instance).
 
+mod explain;
 mod failure;
 mod list;
 mod plan;
@@ -65,6 +66,8 @@ enum Command {
     },
     /// Run suites and print their table
     Run(RunArgs),
+    /// Show how a method sees a problem: the graph and the network matrix of davies
+    Explain(ExplainArgs),
     /// Solve the control step in a file and print the answer as JSON
     Solve(SolveArgs),
     /// Draw the figures of a results folder
@@ -150,6 +153,23 @@ struct SolveArgs {
     set: Vec<String>,
 }
 
+#[derive(Debug, Args)]
+struct ExplainArgs {
+    /// Method
+    method: String,
+    /// Embedded robot: the first suite that has it gives the problem
+    #[arg(
+        long,
+        value_name = "ROBOT",
+        required_unless_present = "suite",
+        conflicts_with = "suite"
+    )]
+    robot: Option<String>,
+    /// Suite whose problem is explained: an id or the path of a .toml file
+    #[arg(long, value_name = "SUITE")]
+    suite: Option<String>,
+}
+
 fn rates(word: &str) -> Result<Rates, String> {
     let found = Rates::WORDS.iter().find(|(known, _)| *known == word);
     found
@@ -178,6 +198,7 @@ fn dispatch(cli: &Cli, out: &mut dyn Write) -> Result<(), Failure> {
         None => run::everything(&cli.everything, out),
         Some(Command::List { what }) => list::list(*what, out).map_err(Failure::from),
         Some(Command::Run(args)) => run::run(args, out),
+        Some(Command::Explain(args)) => explain::explain(args, out),
         Some(Command::Solve(args)) => solve::solve(args, out),
         Some(Command::Figures { dir }) => draw(dir, out),
         Some(Command::Readme { dir, readme }) => {

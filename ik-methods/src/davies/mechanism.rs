@@ -3,7 +3,7 @@
 //!
 //! Joints stand in the order of the columns of the network matrix: root chain, real joints, task chains.
 
-use super::circuits::Circuits;
+use super::circuits::{Circuits, Group, RootChain};
 use ik_core::problem::{PhaseId, Problem};
 use ik_core::robot::{Robot, Root};
 use ik_core::task::{Priority, Track};
@@ -85,6 +85,23 @@ pub struct Mechanism {
     pub circuits: Vec<MechanismCircuit>,
     /// Task whose chain is the root's, if one is.
     pub imposed_root: Option<usize>,
+    /// Blocks of N_s: circuits that share no unknown with others.
+    pub blocks: Vec<MechanismBlock>,
+}
+
+/// Circuits that are solved together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MechanismBlock {
+    /// Their tasks.
+    pub tasks: Vec<String>,
+    /// Indices of the real joints among their unknowns.
+    pub joints: Vec<usize>,
+    /// Whether the root is among them.
+    pub free_root: bool,
+    /// Coordinates that hard tasks impose on them.
+    pub imposed: usize,
+    /// Coordinates that compromised tasks impose.
+    pub compromised: usize,
 }
 
 const CHAIN: [&str; 6] = ["px", "py", "pz", "rx", "ry", "rz"];
@@ -94,7 +111,8 @@ impl Mechanism {
     pub fn new(problem: &Problem, phase: PhaseId) -> Self {
         let robot = problem.robot();
         let phase = &problem.phases()[phase.0];
-        let imposed_root = Circuits::new(problem, phase).imposed_root;
+        let circuits = Circuits::new(problem, phase);
+        let imposed_root = circuits.imposed_root;
         let mut mechanism = Self {
             links: vec![MechanismLink {
                 name: "ground".to_owned(),
@@ -103,6 +121,11 @@ impl Mechanism {
             joints: Vec::new(),
             circuits: Vec::new(),
             imposed_root,
+            blocks: circuits
+                .groups
+                .iter()
+                .map(|group| block(problem, group))
+                .collect(),
         };
         for body in robot.bodies() {
             mechanism.link(&body.name, LinkKind::Body);
@@ -252,6 +275,20 @@ impl Mechanism {
             joints: forward.chain(back).collect(),
             rows,
         });
+    }
+}
+
+fn block(problem: &Problem, group: &Group) -> MechanismBlock {
+    let root = problem.robot().root().nv();
+    let all = || group.hard.iter().chain(&group.soft);
+    let mut tasks: Vec<String> = all().map(|c| problem.tasks()[c.task].name.clone()).collect();
+    tasks.dedup();
+    MechanismBlock {
+        tasks,
+        joints: group.joints.iter().map(|joint| root + joint).collect(),
+        free_root: group.root == RootChain::Free,
+        imposed: group.hard.iter().map(|c| c.rows).sum(),
+        compromised: group.soft.iter().map(|c| c.rows).sum(),
     }
 }
 

@@ -48,7 +48,9 @@ mod mechanism;
 mod network;
 mod virtual_chain;
 
-pub use mechanism::{LinkKind, Mechanism, MechanismCircuit, MechanismJoint, MechanismLink, Role};
+pub use mechanism::{
+    LinkKind, Mechanism, MechanismBlock, MechanismCircuit, MechanismJoint, MechanismLink, Role,
+};
 pub use network::{Network, ReferencePoint};
 
 use crate::registry::{Allowed, Field, Method, MethodInfo, Parameters, Preset};
