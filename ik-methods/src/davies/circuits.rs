@@ -8,7 +8,7 @@
 //! Circuits are coupled by shared joints only, and by the root if it is free: with an imposed root and one task per limb
 //! the secondary matrix falls into one block per limb, which are solved one by one.
 
-use super::least_norm::{MOST_FREE, Stage};
+use super::least_norm::{MOST_FREE, ROUNDING, Stage};
 use super::virtual_chain::Instant;
 use ik_core::kinematics::Page;
 use ik_core::kinematics::screws::{for_each_screw, root_screws};
@@ -18,6 +18,12 @@ use ik_core::spatial::screw::Screw;
 use ik_core::task::{Priority, Track};
 use ik_core::weights::WeightFactor;
 use nalgebra::Vector3;
+
+/// Hard rows whose least pivot is below this part of the largest are dependent. With unit axes and limbs of some decimetres,
+/// a twist of 1 mm/s would ask for some 1e3 rad/s there; no finite difference of the method sees that far. Their last
+/// direction is damped but never dropped: it is the one in which a nearly straight limb bends, and with it dropped the limb
+/// stays straight for good (bioloid/squat z190).
+const DEPENDENT: f64 = 1e-6;
 
 /// Part of a task that closes one circuit: the task itself, or one joint of a posture.
 #[derive(Clone, Debug)]
@@ -314,7 +320,7 @@ impl Group {
     ) -> Quality {
         self.fill_hard(at, root, place);
         let [hard, soft] = &mut self.stages;
-        let independent = hard.factorise() > 0.0;
+        let independent = hard.factorise(f64::EPSILON) > DEPENDENT;
         let lambda = if independent {
             damping.hard
         } else {
@@ -334,7 +340,7 @@ impl Group {
                 self.joints.len(),
             );
             hard.follow(&mut self.soft_rows, soft);
-            let pivot = soft.factorise();
+            let pivot = soft.factorise(ROUNDING);
             soft.decide(damping.soft_at(pivot));
             let (free, costed) = hard.left();
             soft.finish(&mut u[..free], &mut x[..costed]);

@@ -14,11 +14,9 @@
 //!
 //! Rows are stored `[F | C | y]`, one after the other.
 
-/// A pivot below this part of the largest one counts as zero: the rows are dependent. With unit axes and limbs of some
-/// decimetres, a twist of 1 mm/s would ask for some 1e3 rad/s there; no finite difference of the method sees that far.
-pub(super) const DEPENDENT: f64 = 1e-6;
-/// Columns of F below this part of the largest one count as dependent on the others: rounding of some hundred operations.
-const FREE_DEPENDENT: f64 = 1e-12;
+/// A row or column below this part of the largest one counts as dependent on the others: rounding of some hundred
+/// operations.
+pub(super) const ROUNDING: f64 = 1e-12;
 
 /// Rows of one priority and their factorisation. Sized once; nothing here allocates afterwards.
 #[derive(Clone, Debug)]
@@ -87,9 +85,11 @@ impl Stage {
 
     /// Factorises both parts. Returns the least pivot of C below F as part of the largest, 1 without rows: never less
     /// than the inverse of its condition number, and 0 where its rows are dependent.
-    pub(super) fn factorise(&mut self) -> f64 {
+    ///
+    /// Rows whose pivot is below `drop` of the largest have no direction of their own and are left out.
+    pub(super) fn factorise(&mut self, drop: f64) -> f64 {
         self.eliminate_free();
-        self.triangulate();
+        self.triangulate(drop);
         let full = (self.height - self.free_rank).min(self.costed);
         let pivot = |k: usize| self.rows[(self.free_rank + k) * self.width + self.free + k].abs();
         match full {
@@ -120,7 +120,7 @@ impl Stage {
                 .fold((k, -1.0), |best, next| if next.1 > best.1 { next } else { best });
             let norm = square.sqrt();
             first = f64::max(first, norm);
-            if norm <= FREE_DEPENDENT * first {
+            if norm <= ROUNDING * first {
                 break;
             }
             self.order.swap(k, best);
@@ -156,7 +156,7 @@ impl Stage {
     }
 
     /// C below F lower triangular by reflections from the right, rows pivoted by length.
-    fn triangulate(&mut self) {
+    fn triangulate(&mut self, drop: f64) {
         let (f, n, w) = (self.free, self.costed, self.width);
         self.rank = 0;
         let below = &mut self.rows[self.free_rank * w..self.height * w];
@@ -171,7 +171,7 @@ impl Stage {
                 .fold((k, -1.0), |best, next| if next.1 > best.1 { next } else { best });
             let norm = square.sqrt();
             first = f64::max(first, norm);
-            if norm <= DEPENDENT * first {
+            if norm <= drop * first {
                 break;
             }
             swap_rows(below, w, k, best);
@@ -438,7 +438,7 @@ mod tests {
                 for damping in [0.0, 1e-3, 0.3] {
                     let case = case(seed, m, f, n);
                     let mut stage = stage(&case);
-                    assert!(stage.factorise() > 0.0);
+                    assert!(stage.factorise(ROUNDING) > 0.0);
                     stage.decide(damping);
                     let (u, x) = answer(&stage, f, n);
                     let expected = oracle(&case, damping);
@@ -462,7 +462,7 @@ mod tests {
             let copy = case.c.row(1) * 2.0;
             case.c.row_mut(4).copy_from(&copy);
             let mut stage = stage(&case);
-            assert_eq!(stage.factorise(), 0.0);
+            assert_eq!(stage.factorise(ROUNDING), 0.0);
             let missed = stage.decide(0.0);
             let (_, x) = answer(&stage, 0, 7);
             assert!((&x - oracle(&case, 0.0)).amax() < 1e-8);
@@ -477,11 +477,11 @@ mod tests {
                 let (m, f, n) = hard;
                 let (first, second) = (case(seed, m, f, n), case(seed + 77, soft, f, n));
                 let mut a = stage(&first);
-                a.factorise();
+                a.factorise(ROUNDING);
                 a.decide(0.0);
                 let mut b = Stage::new(soft, f, n);
                 a.follow(&mut rows(&second), &mut b);
-                b.factorise();
+                b.factorise(ROUNDING);
                 let missed = b.decide(0.0);
                 let (mut u, mut x) = (vec![0.0; f], vec![0.0; n]);
                 b.finish(&mut u, &mut x);
