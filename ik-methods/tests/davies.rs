@@ -414,7 +414,7 @@ fn real_rates(
 }
 
 #[test]
-fn a_square_network_is_solved_as_eq_9_says() {
+fn a_square_network_is_solved_as_eq_11_says() {
     let (mut compared, mut worst) = (0, 0.0_f64);
     for problem in square_problems() {
         for seed in 0..60 {
@@ -668,4 +668,48 @@ fn the_rule_of_four_evaluations_is_of_fourth_order_on_a_turning_root() {
     let (coarse, fine) = (error(40), error(80));
     println!("{coarse:e} {fine:e}, ratio {}", coarse / fine);
     assert!(coarse / fine > 13.0 && fine < 1e-6, "{coarse:e} {fine:e}");
+}
+
+/// Columns of the chain of the right foot in its own circuit.
+fn chain_of_right_foot(q: &[f64], rates: OrientationRates) -> DMatrix<f64> {
+    let robot = bioloid();
+    let problem = problem(&robot, &gait_tasks(&robot, Priority::Hard));
+    let network = Network::new(&problem, WHOLE, q, ReferencePoint::Task, rates);
+    let joints = &network.mechanism.joints;
+    let first = joints.iter().position(|j| j.name == "right-foot px").unwrap();
+    network.n.view((0, first), (6, 6)).into_owned()
+}
+
+/// Eq. (7) prints the prismatic rate along y twice and none along z.
+#[test]
+fn the_chain_printed_in_eq_7_cannot_rise() {
+    let chain = chain_of_right_foot(&stance(0.0), OrientationRates::Euler);
+    let mut printed = chain.clone();
+    let along_y = chain.column(1).into_owned();
+    printed.set_column(2, &along_y);
+    assert_eq!((Network::rank(&chain), Network::rank(&printed)), (6, 5));
+    // A vertical velocity: angular part first.
+    let rise = DVector::from_vec(vec![0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    let missed = |chain: &DMatrix<f64>| {
+        let rates = chain.clone().pseudo_inverse(1e-12).unwrap() * &rise;
+        (chain * rates - &rise).norm()
+    };
+    assert!(missed(&chain) < 1e-12 && (missed(&printed) - 1.0).abs() < 1e-12);
+}
+
+/// The text after eq. (7) says the chain's Jacobian can be inverted since it is 6 x 6.
+#[test]
+fn the_chain_called_invertible_is_singular_at_a_right_angle() {
+    let robot = bioloid();
+    let mut q = robot.neutral();
+    let turn = so3::exp_quaternion(&Vector3::new(0.0, std::f64::consts::FRAC_PI_2, 0.0));
+    q[3..7].copy_from_slice(turn.coords.as_slice());
+    assert_eq!(
+        Network::rank(&chain_of_right_foot(&q, OrientationRates::Euler)),
+        5
+    );
+    assert_eq!(
+        Network::rank(&chain_of_right_foot(&q, OrientationRates::AngularVelocity)),
+        6
+    );
 }

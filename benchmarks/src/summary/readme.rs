@@ -20,12 +20,22 @@ pub fn replace_readme_table(readme: &Path, rows: &[Row]) -> Result<(), RecordErr
     replace_between(readme, RESULTS_BEGIN, RESULTS_END, &readme_table(rows))
 }
 
-/// The table of the README: one line per method and budget over the Coman suites.
+/// The tables of the README, one line per method and budget: the Coman suites, then the Bioloid suites beside the plain
+/// squat, if there are rows of them.
 pub fn readme_table(rows: &[Row]) -> String {
     let runs = labelled(rows);
-    let tracked = runs.iter().filter(|r| TRACKED.contains(&r.row.suite.as_str()));
-    let lines: Vec<Vec<String>> = by_method(tracked).iter().map(|group| cells(group)).collect();
-    origin(rows) + "\n" + &markdown(&HEADER, &lines)
+    let table = |suites: &[&str], cells: fn(&[&Labelled<'_>]) -> Vec<String>| {
+        let tracked = runs.iter().filter(|r| suites.contains(&r.row.suite.as_str()));
+        by_method(tracked)
+            .iter()
+            .map(|group| cells(group))
+            .collect::<Vec<_>>()
+    };
+    let mut text = origin(rows) + "\n" + &markdown(&HEADER, &table(&TRACKED, cells));
+    if runs.iter().any(|r| r.row.suite == BIOLOID[0]) {
+        text += &format!("\n{}", markdown(&BIOLOID_HEADER, &table(&BIOLOID, bioloid_cells)));
+    }
+    text
 }
 
 const HEADER: [&str; 11] = [
@@ -42,28 +52,70 @@ const HEADER: [&str; 11] = [
     "×ik1",
 ];
 
-/// The line of one method.
+const BIOLOID_HEADER: [&str; 11] = [
+    "method",
+    "n",
+    "gait: feet max (mm)",
+    "gait: hands rms (mm)",
+    "gait: peak velocity (rad/s)",
+    "gait, 4 rad/s allowed",
+    "com-sway: soft rms (mm)",
+    "squat beyond reach: feet max (mm)",
+    "COMAN squat: soft rms (mm)",
+    "gait: median step (µs)",
+    "×ik1",
+];
+
+/// Suites of the second table.
+const BIOLOID: [&str; 4] = ["bioloid/gait", "bioloid/com-sway", "bioloid/squat", "coman/squat"];
+
+/// The run of a group on a scenario.
+fn run_of<'a>(group: &[&Labelled<'a>], suite: &str, scenario: &str) -> Option<&'a Row> {
+    let mut runs = group.iter().map(|r| r.row);
+    runs.find(|r| r.suite == suite && r.scenario == scenario)
+}
+
+fn metrics(row: Option<&Row>) -> Option<Metrics> {
+    row.and_then(|r| r.metrics.clone())
+}
+
+fn millimetres(metrics: &Option<Metrics>, value: impl Fn(&Metrics) -> Option<f64>) -> String {
+    number(metrics.as_ref().and_then(value).map(|e| e * 1e3))
+}
+
+fn soft_rms(metrics: &Option<Metrics>) -> String {
+    millimetres(metrics, |m| m.quality.worst_soft_rms_m())
+}
+
+/// The line of one method over the Bioloid suites.
+fn bioloid_cells(group: &[&Labelled<'_>]) -> Vec<String> {
+    let of = |suite: usize, scenario: &str| metrics(run_of(group, BIOLOID[suite], scenario));
+    let (gait, beyond) = (of(0, "gait"), of(2, "z190"));
+    let feet = |m: &Option<Metrics>| millimetres(m, |m| Some(m.quality.hard_error_max_m));
+    vec![
+        group[0].label.clone(),
+        group[0].n.map_or(NONE.to_owned(), |n| n.to_string()),
+        feet(&gait),
+        soft_rms(&gait),
+        number(gait.as_ref().map(|m| m.quality.velocity_max_rad_s)),
+        survival(run_of(group, BIOLOID[0], "gait-bounded")),
+        soft_rms(&of(1, "sway")),
+        feet(&beyond),
+        soft_rms(&of(3, "A")),
+        number(gait.as_ref().map(|m| m.effort.step_us_median)),
+        gait.as_ref().map_or(NONE.to_owned(), |m| ratio(&m.effort)),
+    ]
+}
+
+/// The line of one method over the Coman suites.
 fn cells(group: &[&Labelled<'_>]) -> Vec<String> {
-    let of = |suite: &str, scenario: &str| {
-        group
-            .iter()
-            .find(|r| r.row.suite == suite && r.row.scenario == scenario)
-            .map(|r| r.row)
-    };
-    let metrics = |row: Option<&Row>| row.and_then(|r| r.metrics.clone());
-    let millimetres = |m: &Option<Metrics>| {
-        number(
-            m.as_ref()
-                .and_then(|m| m.quality.worst_soft_rms_m())
-                .map(|e| e * 1e3),
-        )
-    };
+    let of = |suite: &str, scenario: &str| run_of(group, suite, scenario);
     let (squat, stretch) = (metrics(of(TRACKED[0], "A")), metrics(of(TRACKED[1], "B")));
     vec![
         group[0].label.clone(),
         group[0].n.map_or(NONE.to_owned(), |n| n.to_string()),
-        millimetres(&squat),
-        millimetres(&stretch),
+        soft_rms(&squat),
+        soft_rms(&stretch),
         number(stretch.as_ref().map(|m| m.quality.velocity_max_rad_s)),
         seconds(stretch.as_ref().and_then(|m| m.quality.singularity_exit_s)),
         survival(of(TRACKED[2], "C")),

@@ -462,7 +462,7 @@ mod tests {
             let copy = case.c.row(1) * 2.0;
             case.c.row_mut(4).copy_from(&copy);
             let mut stage = stage(&case);
-            assert_eq!(stage.factorise(ROUNDING), 0.0);
+            assert!(stage.factorise(ROUNDING) < ROUNDING);
             let missed = stage.decide(0.0);
             let (_, x) = answer(&stage, 0, 7);
             assert!((&x - oracle(&case, 0.0)).amax() < 1e-8);

@@ -30,7 +30,7 @@
 //!
 //! ## Source
 //! Method: Davies (1981), Mechanical networks, Mech. Mach. Theory 16; Assur virtual chains: Campos, Guenther & Martins
-//! (2005). Humanoid: the Bioloid paper of `docs/davies.md`, eqs. (1)-(9), (15).
+//! (2005). Humanoid: the Bioloid paper of `docs/davies.md`, eqs. (1)-(11), (15).
 //!
 //! ## Deviations
 //! Deviation: compromised tasks. The network knows no slack. Their circuits are solved after the hard ones, by damped
@@ -239,7 +239,7 @@ impl Method for Davies {
         id: "davies",
         name: "Davies' network method",
         summary: "circulation law over virtual chains, one step with full closure correction, no boundary",
-        source: "Davies (1981); Campos, Guenther & Martins (2005); Bioloid paper, eqs. (1)-(9)",
+        source: "Davies (1981); Campos, Guenther & Martins (2005); Bioloid paper, eqs. (1)-(11)",
     };
     fn new(parameters: Self::Parameters) -> Self {
         Self { parameters }
@@ -252,7 +252,7 @@ pub const OPEN_LOOP: Preset = Preset {
         id: "davies-open",
         name: "Davies' network method, open loop",
         summary: "the same without closure correction: shows the drift of integrated rates",
-        source: "Davies (1981); Campos, Guenther & Martins (2005); Bioloid paper, eqs. (1)-(9)",
+        source: "Davies (1981); Campos, Guenther & Martins (2005); Bioloid paper, eqs. (1)-(11)",
     },
     values: &[("correction", 0.0)],
 };

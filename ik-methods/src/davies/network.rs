@@ -1,5 +1,5 @@
 //! The network matrix N at one configuration: the circulation law `N q̇ = 0` written out, to be read, printed and compared
-//! with (Davies 1981; the Bioloid paper, eqs. (8), (9), (14), (15)). The stepper works on the same circuits after
+//! with (Davies 1981; the Bioloid paper, eqs. (8)-(11), (15)). The stepper works on the same circuits after
 //! elimination and never forms it.
 
 use super::OrientationRates;
