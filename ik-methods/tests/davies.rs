@@ -441,7 +441,6 @@ fn a_square_network_is_solved_as_eq_11_says() {
             }
         }
     }
-    println!("{compared} rates, worst relative difference {worst:e}");
     assert!(compared > 5000 && worst < 1e-12, "{compared} {worst:e}");
 }
 
@@ -533,7 +532,6 @@ fn a_redundant_robot_on_a_fixed_foot_moves_by_its_pseudo_inverse() {
             }
         }
     }
-    println!("{compared} rates, worst relative difference {worst:e}");
     assert!(compared > 2000 && worst < 1e-12, "{compared} {worst:e}");
 }
 
@@ -560,9 +558,9 @@ fn circuits_at_their_own_points_are_as_well_conditioned_anywhere() {
     }
     // Written at a fixed origin, as the paper does, it grows with the square of the distance.
     let far = [0.0, 1.0, 10.0, 100.0].map(|x| condition(x, ReferencePoint::Origin));
-    println!("own points {here:.1}; origin {far:.1?}");
-    assert!((20.0..100.0).contains(&here));
-    assert!(far[2] > 1e3 && far[3] > 1e5);
+    let all = format!("{here} {far:?}");
+    assert!((20.0..100.0).contains(&here), "{all}");
+    assert!(far[2] > 1e3 && far[3] > 1e5, "{all}");
     assert!((far[3] / far[2] / 100.0 - 1.0).abs() < 0.05, "not a square");
 }
 
@@ -666,7 +664,6 @@ fn the_rule_of_four_evaluations_is_of_fourth_order_on_a_turning_root() {
             .fold(0.0, f64::max)
     };
     let (coarse, fine) = (error(40), error(80));
-    println!("{coarse:e} {fine:e}, ratio {}", coarse / fine);
     assert!(coarse / fine > 13.0 && fine < 1e-6, "{coarse:e} {fine:e}");
 }
 

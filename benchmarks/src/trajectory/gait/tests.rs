@@ -78,7 +78,7 @@ const KNOTS: [(&str, usize, f64, f64); 52] = [
     ("right-foot", 2, 1.78, 0.0),
     ("left-foot", 2, 6.2, 0.0),
     ("left-foot", 2, 6.23, 0.003),
-    ("left-foot", 2, 6.28, 0.009),
+    ("left-foot", 2, 6.2 + 0.08, 0.009),
     ("left-foot", 2, 7.0, 0.03),
     ("left-foot", 2, 7.75, 0.003),
     // (23): four increments per step.
