@@ -8,22 +8,25 @@
 //! Circuits are coupled by shared joints only, and by the root if it is free: with an imposed root and one task per limb
 //! the secondary matrix falls into one block per limb, which are solved one by one.
 
-use super::least_norm::{MOST_FREE, ROUNDING, Stage};
+use super::least_norm::{MOST_FREE, Ranks, Stage};
 use super::virtual_chain::Instant;
-use ik_core::kinematics::Page;
 use ik_core::kinematics::screws::{for_each_screw, root_screws};
+use ik_core::kinematics::{Page, forward};
 use ik_core::problem::{Phase, Problem};
-use ik_core::robot::{Robot, Root};
+use ik_core::robot::Root;
 use ik_core::spatial::screw::Screw;
 use ik_core::task::{Priority, Track};
 use ik_core::weights::WeightFactor;
 use nalgebra::Vector3;
 
-/// Hard rows whose least pivot is below this part of the largest are dependent. With unit axes and limbs of some decimetres,
-/// a twist of 1 mm/s would ask for some 1e3 rad/s there; no finite difference of the method sees that far. Their last
-/// direction is damped but never dropped: it is the one in which a nearly straight limb bends, and with it dropped the limb
-/// stays straight for good (bioloid/squat z190).
-const DEPENDENT: f64 = 1e-6;
+/// Hard rows whose [`Stage::independence`] is below this are damped. It is never less than the inverse of the condition
+/// number, so that nothing is damped below one of 1e5; there a twist of 1 mm/s asks for some 1e2 rad/s.
+const DEPENDENT: f64 = 1e-5;
+/// Pivots below this part of the longest row have no number in them. The last direction of a nearly straight limb is
+/// damped, but never dropped before: with it dropped, the limb stays straight for good (bioloid/squat z190).
+const DROP: f64 = f64::EPSILON;
+/// The same at the postures at which ranks are counted: independent rows stay far above, rounding far below.
+const DROP_AT_GENERIC_POSTURE: f64 = 1e-9;
 
 /// Part of a task that closes one circuit: the task itself, or one joint of a posture.
 #[derive(Clone, Debug)]
@@ -46,9 +49,12 @@ pub(super) struct Group {
     pub(super) joints: Vec<usize>,
     /// Whether the root is among the unknowns.
     pub(super) root: RootChain,
+    /// Hard rows, compromised rows.
     stages: [Stage; 2],
     soft_rows: Vec<f64>,
     x: Vec<f64>,
+    /// Least λ of the hard rows in the later evaluations of a step.
+    floor: f64,
 }
 
 /// What the chain from the ground to the root does for a group of circuits.
@@ -56,8 +62,11 @@ pub(super) struct Group {
 pub(super) enum RootChain {
     /// Its rates are known: imposed, or the root is fixed.
     Known,
-    /// Its six coordinates are unknown and cost nothing.
+    /// Its six coordinates are unknown and cost nothing: the circuits determine them.
     Free,
+    /// Its six coordinates are unknown, and the circuits leave some of them open: all cost what joint rates do, m/s and
+    /// rad/s alike.
+    Costed,
 }
 
 /// All circuits of one phase.
@@ -70,33 +79,43 @@ pub(super) struct Circuits {
     place: Vec<usize>,
 }
 
-/// How the rates of a group came out.
+/// How the rates came out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Quality {
-    /// Whether hard rows were dependent.
-    pub(super) dependent: bool,
+    /// Whether hard rows were damped, or compromised ones are dependent.
+    pub(super) damped: bool,
     /// Sum of squares that hard rows miss.
     pub(super) missed_squared: f64,
 }
 
-/// λ of the two priorities.
+/// λ of the two priorities. Those that fade in towards a singularity are in parts of the longest row, which makes them
+/// independent of units and weights.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Damping {
+    /// λ of hard rows everywhere (m, rad).
     pub(super) hard: f64,
-    pub(super) soft: f64,
-    /// Least pivot from which compromised rows are not damped.
-    pub(super) soft_threshold: f64,
-    /// λ of hard rows that are dependent, at least.
+    /// λ of hard rows at a singularity.
     pub(super) singular: f64,
+    /// λ of compromised rows at a singularity.
+    pub(super) soft: f64,
+    /// Independence from which compromised rows are not damped.
+    pub(super) soft_threshold: f64,
 }
 
-impl Damping {
-    /// λ of compromised rows whose least pivot is this part of the largest: it fades in towards the singularity
-    /// (Nakamura & Hanafusa 1986), so that nothing is distorted away from it.
-    fn soft_at(self, pivot: f64) -> f64 {
-        let near = pivot / self.soft_threshold;
-        self.soft * (1.0 - near * near).max(0.0).sqrt()
-    }
+/// The part of its full value that a damping has at this independence; none from the threshold on (Nakamura & Hanafusa
+/// 1986), so that nothing is distorted away from singularities.
+fn fade(independence: f64, threshold: f64) -> f64 {
+    let near = independence / threshold;
+    (1.0 - near * near).max(0.0).sqrt()
+}
+
+/// What hard tasks impose on one group.
+#[derive(Clone, Debug)]
+pub(super) struct Imposed {
+    pub(super) rows: usize,
+    pub(super) rank: usize,
+    pub(super) mobility: usize,
+    pub(super) tasks: Vec<usize>,
 }
 
 impl Circuits {
@@ -120,7 +139,7 @@ impl Circuits {
                 members.extend::<Vec<_>>(shared);
                 next += 1;
             }
-            groups.push(Group::new(members, robot, &mut place));
+            groups.push(Group::new(members, &mut place));
         }
         groups.reverse();
         Self {
@@ -128,6 +147,65 @@ impl Circuits {
             groups,
             place,
         }
+    }
+
+    /// Counts ranks at the given postures (length nq each), caps the factorisations by them, and lets a root that the
+    /// circuits leave open cost its length. Until then ranks are whatever is found.
+    pub(super) fn count_ranks(&mut self, problem: &Problem, postures: &[Vec<f64>]) {
+        let found = self.ranks_at(problem, postures);
+        for (group, [hard, soft]) in self.groups.iter_mut().zip(found) {
+            if group.root == RootChain::Free && hard.free + soft.free < MOST_FREE {
+                *group = group.with_costed_root();
+            }
+        }
+        let found = self.ranks_at(problem, postures);
+        for (group, ranks) in self.groups.iter_mut().zip(found) {
+            for (stage, ranks) in group.stages.iter_mut().zip(ranks) {
+                stage.cap(ranks);
+            }
+        }
+    }
+
+    /// The largest ranks of both stages of every group.
+    fn ranks_at(&mut self, problem: &Problem, postures: &[Vec<f64>]) -> Vec<[Ranks; 2]> {
+        let mut ranks = vec![[Ranks::NONE; 2]; self.groups.len()];
+        let mut page = Page::new(problem.robot());
+        for q in postures {
+            forward(problem.robot(), q, &mut page);
+            let resting = vec![0.0; 2 * (problem.nx() + problem.nxdot())];
+            let instant = Instant::resting(problem, &resting);
+            let at = Closing {
+                problem,
+                q,
+                page: &page,
+                instant: &instant,
+            };
+            for (group, most) in self.groups.iter_mut().zip(&mut ranks) {
+                group.factorise(&at, &Screw::default(), &self.place, DROP_AT_GENERIC_POSTURE);
+                group.stages[0].decide(0.0);
+                group.follow(&at, &Screw::default(), &self.place, DROP_AT_GENERIC_POSTURE);
+                for (most, stage) in most.iter_mut().zip(&group.stages) {
+                    *most = most.max(stage.found());
+                }
+            }
+        }
+        ranks
+    }
+
+    /// What hard tasks impose on each group, after [`Circuits::count_ranks`].
+    pub(super) fn imposed(&self) -> Vec<Imposed> {
+        let imposed = |group: &Group| {
+            let mut tasks: Vec<usize> = group.hard.iter().map(|c| c.task).collect();
+            tasks.dedup();
+            let ranks = group.stages[0].most();
+            Imposed {
+                rows: group.hard.iter().map(|c| c.rows).sum(),
+                rank: ranks.free + ranks.costed,
+                mobility: group.unknowns(),
+                tasks,
+            }
+        };
+        self.groups.iter().map(imposed).collect()
     }
 
     /// Writes the velocity (length nv, world axes) that closes all circuits while the primary joints move as imposed.
@@ -156,18 +234,10 @@ impl Circuits {
         let mut quality = Quality::default();
         for group in &mut self.groups {
             let found = group.solve(&at, &root, &self.place, damping, v);
-            quality.dependent |= found.dependent;
+            quality.damped |= found.damped;
             quality.missed_squared += found.missed_squared;
         }
         quality
-    }
-
-    /// Writes the hard rows of group `g` at a configuration, right-hand sides included, and returns them with their
-    /// width; the unknowns are the root's six, if they are, and the group's joints.
-    pub(super) fn hard_rows(&mut self, g: usize, at: &Closing<'_>) -> (&[f64], usize) {
-        let group = &mut self.groups[g];
-        group.fill_hard(at, &Screw::default(), &self.place);
-        (group.stages[0].rows(), group.stages[0].width())
     }
 }
 
@@ -276,7 +346,7 @@ fn posture_pieces(task: usize, hard: bool, rows: usize, weights: Option<WeightFa
 }
 
 impl Group {
-    fn new(mut members: Vec<Piece>, robot: &Robot, place: &mut [usize]) -> Self {
+    fn new(mut members: Vec<Piece>, place: &mut [usize]) -> Self {
         members.sort_by_key(|piece| (piece.circuit.task, piece.circuit.joint));
         let mut joints: Vec<usize> = members.iter().flat_map(|piece| piece.joints.clone()).collect();
         joints.sort_unstable();
@@ -287,16 +357,19 @@ impl Group {
         let free = members.iter().any(|piece| piece.root == RootChain::Free);
         let root = if free { RootChain::Free } else { RootChain::Known };
         let (hard, soft): (Vec<_>, Vec<_>) = members.into_iter().partition(|piece| piece.hard);
-        let circuits = |pieces: Vec<Piece>| pieces.into_iter().map(|p| p.circuit).collect::<Vec<_>>();
-        let (hard, soft) = (circuits(hard), circuits(soft));
+        let circuits = |pieces: Vec<Piece>| pieces.into_iter().map(|p| p.circuit).collect();
+        Self::of(circuits(hard), circuits(soft), joints, root)
+    }
+
+    fn of(hard: Vec<Circuit>, soft: Vec<Circuit>, joints: Vec<usize>, root: RootChain) -> Self {
         let height = |circuits: &[Circuit]| circuits.iter().map(|c| c.rows).sum::<usize>();
-        let unknown = root.unknowns();
-        let stage = |circuits: &[Circuit]| Stage::new(height(circuits), unknown, joints.len());
-        debug_assert!(joints.len() <= robot.coordinates().len());
+        let (free, costed) = root.split(joints.len());
+        let stage = |circuits: &[Circuit]| Stage::new(height(circuits), free, costed);
         Self {
             stages: [stage(&hard), stage(&soft)],
-            soft_rows: vec![0.0; height(&soft) * (unknown + joints.len() + 1)],
-            x: vec![0.0; joints.len()],
+            soft_rows: vec![0.0; height(&soft) * (free + costed + 1)],
+            x: vec![0.0; costed],
+            floor: 0.0,
             hard,
             soft,
             joints,
@@ -304,9 +377,32 @@ impl Group {
         }
     }
 
-    fn fill_hard(&mut self, at: &Closing<'_>, root: &Screw, place: &[usize]) {
-        let rows = self.stages[0].clear(self.root.unknowns(), self.joints.len());
-        at.fill(&self.hard, self.root, root, place, rows, self.joints.len());
+    fn with_costed_root(&self) -> Self {
+        let (hard, soft) = (self.hard.clone(), self.soft.clone());
+        Self::of(hard, soft, self.joints.clone(), RootChain::Costed)
+    }
+
+    /// Root coordinates and joints among the unknowns.
+    fn unknowns(&self) -> usize {
+        let (free, costed) = self.root.split(self.joints.len());
+        free + costed
+    }
+
+    /// Fills and factorises the hard rows.
+    fn factorise(&mut self, at: &Closing<'_>, root: &Screw, place: &[usize], drop: f64) {
+        let (free, costed) = self.root.split(self.joints.len());
+        let rows = self.stages[0].clear(free, costed);
+        at.fill(&self.hard, self.root, root, place, rows);
+        self.stages[0].factorise(drop);
+    }
+
+    /// Fills and factorises the compromised rows in what the decided hard ones leave.
+    fn follow(&mut self, at: &Closing<'_>, root: &Screw, place: &[usize], drop: f64) {
+        self.soft_rows.fill(0.0);
+        at.fill(&self.soft, self.root, root, place, &mut self.soft_rows);
+        let [hard, soft] = &mut self.stages;
+        hard.follow(&mut self.soft_rows, soft);
+        soft.factorise_followed(drop);
     }
 
     /// Rates of the group's joints (and root): hard circuits first, the compromised ones in what those leave.
@@ -318,53 +414,69 @@ impl Group {
         damping: Damping,
         v: &mut [f64],
     ) -> Quality {
-        self.fill_hard(at, root, place);
-        let [hard, soft] = &mut self.stages;
-        let independent = hard.factorise(f64::EPSILON) > DEPENDENT;
-        let lambda = if independent {
-            damping.hard
-        } else {
-            damping.hard.max(damping.singular)
-        };
-        let missed = hard.decide(lambda);
-        let (mut u, x) = ([0.0; MOST_FREE], &mut self.x);
-        x.fill(0.0);
-        if !self.soft.is_empty() {
-            self.soft_rows.fill(0.0);
-            at.fill(
-                &self.soft,
-                self.root,
-                root,
-                place,
-                &mut self.soft_rows,
-                self.joints.len(),
-            );
-            hard.follow(&mut self.soft_rows, soft);
-            let pivot = soft.factorise(ROUNDING);
-            soft.decide(damping.soft_at(pivot));
+        self.factorise(at, root, place, DROP);
+        let (lambda, mut damped) = self.hard_damping(at, damping);
+        let missed = self.stages[0].decide(lambda);
+        let mut u = [0.0; MOST_FREE];
+        self.x.fill(0.0);
+        if !self.stages[1].is_empty() {
+            self.follow(at, root, place, DROP);
+            let [hard, soft] = &mut self.stages;
+            let independence = soft.independence();
+            damped |= independence < DEPENDENT;
+            soft.decide(damping.soft * fade(independence, damping.soft_threshold) * soft.row_scale());
             let (free, costed) = hard.left();
-            soft.finish(&mut u[..free], &mut x[..costed]);
+            soft.finish(&mut u[..free], &mut self.x[..costed]);
         }
-        let unknown = self.root.unknowns();
-        hard.finish(&mut u[..unknown], x);
-        v[..unknown].copy_from_slice(&u[..unknown]);
+        let (free, _) = self.root.split(self.joints.len());
+        self.stages[0].finish(&mut u[..free], &mut self.x);
+        let joints = match self.root {
+            RootChain::Known => &self.x[..],
+            RootChain::Free => {
+                v[..6].copy_from_slice(&u);
+                &self.x[..]
+            }
+            RootChain::Costed => {
+                v[..6].copy_from_slice(&self.x[..6]);
+                &self.x[6..]
+            }
+        };
         let first = at.problem.robot().root().nv();
-        for (&joint, rate) in self.joints.iter().zip(&*x) {
+        for (&joint, rate) in self.joints.iter().zip(joints) {
             v[first + joint] = *rate;
         }
         Quality {
-            dependent: !independent,
+            damped,
             missed_squared: missed * missed,
         }
+    }
+
+    /// λ of the hard rows, and whether it is any. What the first evaluation of a step needs, the others keep: a limb that
+    /// damping has just moved off a singularity would else be thrown by the next one.
+    fn hard_damping(&mut self, at: &Closing<'_>, damping: Damping) -> (f64, bool) {
+        let hard = &mut self.stages[0];
+        let faded = fade(hard.independence(), DEPENDENT);
+        let singular = damping.singular * faded * hard.row_scale();
+        let kept = if at.instant.tau > 0.0 { self.floor } else { 0.0 };
+        self.floor = singular.max(kept);
+        let lambda = damping.hard.max(self.floor);
+        (lambda, lambda > 0.0 && !hard.is_empty())
     }
 }
 
 impl RootChain {
-    pub(super) fn unknowns(self) -> usize {
+    /// Free and costed unknowns of a group of `joints` joints. Rows are `[root | joints | imposed]` in either case.
+    fn split(self, joints: usize) -> (usize, usize) {
         match self {
-            Self::Known => 0,
-            Self::Free => 6,
+            Self::Known => (0, joints),
+            Self::Free => (6, joints),
+            Self::Costed => (0, 6 + joints),
         }
+    }
+
+    /// Whether the root is among the unknowns.
+    pub(super) fn is_unknown(self) -> bool {
+        self != Self::Known
     }
 }
 
@@ -393,17 +505,10 @@ impl Closing<'_> {
     }
 
     /// Adds the rows `[root | joints | imposed]` of circuits to `rows`, which are zero.
-    fn fill(
-        &self,
-        circuits: &[Circuit],
-        chain: RootChain,
-        root: &Screw,
-        place: &[usize],
-        rows: &mut [f64],
-        joints: usize,
-    ) {
-        let unknown = chain.unknowns();
-        let width = unknown + joints + 1;
+    fn fill(&self, circuits: &[Circuit], chain: RootChain, root: &Screw, place: &[usize], rows: &mut [f64]) {
+        let height: usize = circuits.iter().map(|c| c.rows).sum();
+        let unknown = if chain.is_unknown() { 6 } else { 0 };
+        let width = rows.len() / height.max(1);
         let mut begin = 0;
         for circuit in circuits {
             let rows = &mut rows[begin * width..(begin + circuit.rows) * width];
@@ -437,7 +542,7 @@ impl Closing<'_> {
         let point = page.frame_position(robot, frame);
         let mut imposed = self.instant.twist(problem, circuit.task, page);
         match (chain, robot.root()) {
-            (RootChain::Free, _) => {
+            (RootChain::Free | RootChain::Costed, _) => {
                 for (k, screw) in root_screws(robot, page, &point).iter().enumerate() {
                     block.add(k, screw, linear, angular);
                 }
@@ -474,7 +579,7 @@ impl Closing<'_> {
         for v in 0..first {
             let column = self.page.centre_of_mass_column(v);
             match chain {
-                RootChain::Free => block.add3(v, &column, 0),
+                RootChain::Free | RootChain::Costed => block.add3(v, &column, 0),
                 RootChain::Known => {
                     let rate = if v < 3 {
                         root.linear[v]
@@ -497,12 +602,11 @@ impl Closing<'_> {
 
     fn fill_posture(&self, circuit: &Circuit, place: &[usize], block: Block<'_>) {
         let slot = self.problem.slots()[circuit.task];
-        let joints = &self.q[self.problem.robot().root().nq()..];
         let range = circuit.joint.map_or(0..circuit.rows, |j| j..j + 1);
         for (row, j) in range.enumerate() {
             let row = &mut block.rows[row * block.width..(row + 1) * block.width];
             row[block.unknown + place[j]] = 1.0;
-            row[block.width - 1] = self.instant.joint_rate(slot, j, joints[j]);
+            row[block.width - 1] = self.instant.joint_rate(slot, j);
         }
     }
 }

@@ -12,11 +12,40 @@
 //! free. The next stage of priority ([`Stage::follow`]) is written in z and the u that are left, and so cannot disturb
 //! this one.
 //!
+//! What is left after an elimination may be rounding alone and is no measure of itself: pivots are compared with the rows
+//! as they came in, and there are never more of them than the rows can have at a posture without symmetry.
+//!
 //! Rows are stored `[F | C | y]`, one after the other.
 
-/// A row or column below this part of the largest one counts as dependent on the others: rounding of some hundred
-/// operations.
-pub(super) const ROUNDING: f64 = 1e-12;
+/// Free columns below this part of the largest are dependent on the others: unknowns that the rows hardly see would take
+/// rates of a million times what is asked for.
+const FREE_DEPENDENT: f64 = 1e-6;
+/// Rows shorter than this (m, rad) are no rows: a frame on the axes that should move it, or a weight that weighs nothing.
+const SHORTEST: f64 = 1e-12;
+/// Free unknowns there can be: the six of a root.
+pub(super) const MOST_FREE: usize = 6;
+
+/// Ranks of the two parts of a stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Ranks {
+    /// Of F.
+    pub(super) free: usize,
+    /// Of C below F.
+    pub(super) costed: usize,
+}
+
+impl Ranks {
+    /// None at all.
+    pub(super) const NONE: Self = Self { free: 0, costed: 0 };
+
+    /// The larger of each.
+    pub(super) fn max(self, other: Self) -> Self {
+        Self {
+            free: self.free.max(other.free),
+            costed: self.costed.max(other.costed),
+        }
+    }
+}
 
 /// Rows of one priority and their factorisation. Sized once; nothing here allocates afterwards.
 #[derive(Clone, Debug)]
@@ -26,15 +55,18 @@ pub(super) struct Stage {
     width: usize,
     height: usize,
     rows: Vec<f64>,
+    /// Ranks the rows can have.
+    most: Ranks,
+    /// Length of the longest column of F and of the longest row of C as they came in.
+    free_scale: f64,
+    row_scale: f64,
     /// Column of F that stands at each place after pivoting.
     order: Vec<usize>,
-    /// Rank of F.
-    free_rank: usize,
-    /// Rank of C below F.
-    rank: usize,
-    /// Reflection k from the right is `1 − scale[k] v vᵀ`, v at `reflections[k * costed..]`.
+    /// Ranks found.
+    found: Ranks,
+    /// Reflection k from the right is `1 − factors[k] v vᵀ`, v at `reflections[k * costed..]`.
     reflections: Vec<f64>,
-    scale: Vec<f64>,
+    factors: Vec<f64>,
     /// The part of x that the stage decides, in the coordinates of Q.
     decided: Vec<f64>,
     /// A row's worth of sums.
@@ -44,7 +76,7 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    /// Room for `height` rows in `free` free and `costed` costed unknowns.
+    /// Room for `height` rows in `free` free and `costed` costed unknowns, whose ranks can be as large as that allows.
     pub(super) fn new(height: usize, free: usize, costed: usize) -> Self {
         let width = free + costed + 1;
         let most = height.min(costed);
@@ -54,23 +86,48 @@ impl Stage {
             width,
             height,
             rows: vec![0.0; height * width],
+            most: Ranks {
+                free: free.min(height),
+                costed: most,
+            },
+            free_scale: 0.0,
+            row_scale: 0.0,
             order: (0..free).collect(),
-            free_rank: 0,
-            rank: 0,
+            found: Ranks::NONE,
             reflections: vec![0.0; most * costed],
-            scale: vec![0.0; most],
+            factors: vec![0.0; most],
             decided: vec![0.0; most],
             sums: vec![0.0; width],
             small: vec![0.0; (height + most) * (most + 1)],
         }
     }
 
-    /// Numbers of one row: free, costed, right-hand side.
-    pub(super) fn width(&self) -> usize {
-        self.width
+    /// Sets the ranks the rows can have, known from postures without symmetry.
+    pub(super) fn cap(&mut self, most: Ranks) {
+        self.most = most;
     }
 
-    /// Zeroes the rows and hands them out to be filled, `[F | C | y]` each. The sizes are those of [`Stage::new`] again.
+    /// Ranks the rows can have.
+    pub(super) fn most(&self) -> Ranks {
+        self.most
+    }
+
+    /// Ranks found by the last factorisation.
+    pub(super) fn found(&self) -> Ranks {
+        self.found
+    }
+
+    /// Whether there are rows at all.
+    pub(super) fn is_empty(&self) -> bool {
+        self.height == 0
+    }
+
+    /// Length of the longest row of C as it came in.
+    pub(super) fn row_scale(&self) -> f64 {
+        self.row_scale
+    }
+
+    /// Zeroes the rows and hands them out to be filled, `[F | C | y]` each.
     pub(super) fn clear(&mut self, free: usize, costed: usize) -> &mut [f64] {
         (self.free, self.costed, self.width) = (free, costed, free + costed + 1);
         let rows = &mut self.rows[..self.height * self.width];
@@ -78,25 +135,18 @@ impl Stage {
         rows
     }
 
-    /// The rows as they are.
-    pub(super) fn rows(&self) -> &[f64] {
-        &self.rows[..self.height * self.width]
+    /// Factorises rows that were filled in by the caller. Rows of C whose pivot is below `drop` of the longest row are left
+    /// out.
+    pub(super) fn factorise(&mut self, drop: f64) {
+        (self.free_scale, self.row_scale) =
+            scales(&self.rows[..self.height * self.width], self.free, self.width);
+        self.factorise_followed(drop);
     }
 
-    /// Factorises both parts. Returns the least pivot of C below F as part of the largest, 1 without rows: never less
-    /// than the inverse of its condition number, and 0 where its rows are dependent.
-    ///
-    /// Rows whose pivot is below `drop` of the largest have no direction of their own and are left out.
-    pub(super) fn factorise(&mut self, drop: f64) -> f64 {
+    /// Factorises rows that [`Stage::follow`] wrote, as [`Stage::factorise`] does.
+    pub(super) fn factorise_followed(&mut self, drop: f64) {
         self.eliminate_free();
         self.triangulate(drop);
-        let full = (self.height - self.free_rank).min(self.costed);
-        let pivot = |k: usize| self.rows[(self.free_rank + k) * self.width + self.free + k].abs();
-        match full {
-            0 => 1.0,
-            _ if self.rank < full => 0.0,
-            _ => pivot(full - 1) / pivot(0),
-        }
     }
 
     /// F upper triangular by reflections from the left, columns pivoted by length.
@@ -104,23 +154,16 @@ impl Stage {
         for (place, column) in self.order[..self.free].iter_mut().enumerate() {
             *column = place;
         }
-        self.free_rank = 0;
-        let (w, mut first) = (self.width, 0.0);
-        for k in 0..self.free.min(self.height) {
-            let length = |c: usize| {
-                self.rows[k * w..]
-                    .iter()
-                    .skip(c)
-                    .step_by(w)
-                    .map(|x| x * x)
-                    .sum::<f64>()
+        self.found.free = 0;
+        let w = self.width;
+        for k in 0..self.most.free.min(self.free).min(self.height) {
+            let square = |c: usize| {
+                let column = self.rows[k * w..self.height * w].iter().skip(c).step_by(w);
+                column.map(|x| x * x).sum::<f64>()
             };
-            let (best, square) = (k..self.free)
-                .map(|c| (c, length(c)))
-                .fold((k, -1.0), |best, next| if next.1 > best.1 { next } else { best });
+            let (best, square) = longest((k..self.free).map(|c| (c, square(c))), k);
             let norm = square.sqrt();
-            first = f64::max(first, norm);
-            if norm <= ROUNDING * first {
+            if norm <= FREE_DEPENDENT * self.free_scale {
                 break;
             }
             self.order.swap(k, best);
@@ -128,7 +171,7 @@ impl Stage {
                 row.swap(k, best);
             }
             self.reflect_rows(k, norm);
-            self.free_rank += 1;
+            self.found.free += 1;
         }
     }
 
@@ -140,7 +183,7 @@ impl Stage {
         let pivot = -norm.copysign(head);
         // The reflector is column k with `head − pivot` at its head; it stays there until it has been applied.
         rows[k] = head - pivot;
-        let scale = 1.0 / (norm * (norm + head.abs()));
+        let factor = 1.0 / (norm * (norm + head.abs()));
         let sums = &mut self.sums[k + 1..w];
         sums.fill(0.0);
         for row in rows.chunks_exact(w) {
@@ -148,7 +191,7 @@ impl Stage {
             sums.iter_mut().zip(&row[k + 1..]).for_each(|(s, x)| *s += v * x);
         }
         for row in rows.chunks_exact_mut(w) {
-            let v = scale * row[k];
+            let v = factor * row[k];
             row[k] = 0.0;
             row[k + 1..].iter_mut().zip(&*sums).for_each(|(x, s)| *x -= v * s);
         }
@@ -158,20 +201,15 @@ impl Stage {
     /// C below F lower triangular by reflections from the right, rows pivoted by length.
     fn triangulate(&mut self, drop: f64) {
         let (f, n, w) = (self.free, self.costed, self.width);
-        self.rank = 0;
-        let below = &mut self.rows[self.free_rank * w..self.height * w];
-        let mut first = 0.0;
-        for k in 0..n.min(below.len() / w) {
-            let length = |row: &[f64]| row[f + k..f + n].iter().map(|x| x * x).sum::<f64>();
-            let (best, square) = below
-                .chunks_exact(w)
-                .enumerate()
-                .skip(k)
-                .map(|(i, row)| (i, length(row)))
-                .fold((k, -1.0), |best, next| if next.1 > best.1 { next } else { best });
+        self.found.costed = 0;
+        let below = &mut self.rows[self.found.free * w..self.height * w];
+        let height = below.len() / w;
+        for k in 0..self.most.costed.min(n).min(height) {
+            let square = |row: &[f64]| row[f + k..f + n].iter().map(|x| x * x).sum::<f64>();
+            let lengths = below.chunks_exact(w).map(square).enumerate().skip(k);
+            let (best, square) = longest(lengths, k);
             let norm = square.sqrt();
-            first = f64::max(first, norm);
-            if norm <= drop * first {
+            if norm <= drop * self.row_scale.max(SHORTEST) {
                 break;
             }
             swap_rows(below, w, k, best);
@@ -181,21 +219,63 @@ impl Stage {
             let v = &mut self.reflections[k * n + k..(k + 1) * n];
             v.copy_from_slice(row);
             v[0] -= pivot;
-            self.scale[k] = 1.0 / (norm * (norm + row[0].abs()));
+            self.factors[k] = 1.0 / (norm * (norm + row[0].abs()));
             row.fill(0.0);
             row[0] = pivot;
             for row in rest.chunks_exact_mut(w) {
-                reflect(v, self.scale[k], &mut row[f + k..f + n]);
+                reflect(v, self.factors[k], &mut row[f + k..f + n]);
             }
-            self.rank += 1;
+            self.found.costed += 1;
         }
+    }
+
+    /// The rows of C below F, and their number.
+    fn below(&self) -> (&[f64], usize) {
+        let rows = &self.rows[self.found.free * self.width..self.height * self.width];
+        (rows, self.height - self.found.free)
+    }
+
+    /// How far the rows are from dependence: `√rank / (‖C⁺‖ scale)` in the Frobenius norm, C being what is below F and
+    /// scale the length of its longest row as it came in. That is the harmonic mean square of the singular values over the
+    /// scale: 1 for orthogonal rows of one length, continuous in the rows, between σ_min and √rank σ_min over the scale. 1
+    /// without rows, 0 where a rank is less than it can be.
+    pub(super) fn independence(&mut self) -> f64 {
+        let (f, w, r) = (self.free, self.width, self.found.costed);
+        let possible = self
+            .most
+            .costed
+            .min(self.costed)
+            .min(self.height - self.found.free);
+        if self.found.free < self.most.free.min(self.free) || r < possible {
+            return 0.0;
+        }
+        if r == 0 {
+            return 1.0;
+        }
+        let below = &self.rows[self.found.free * w..];
+        let (column, mut squares) = (&mut self.decided, 0.0);
+        for k in 0..r {
+            for i in k..r {
+                let row = &below[i * w + f..i * w + f + i + 1];
+                let known: f64 = row[k..i].iter().zip(&column[k..i]).map(|(l, x)| l * x).sum();
+                let one = if i == k { 1.0 } else { 0.0 };
+                column[i] = (one - known) / row[i];
+                squares += column[i] * column[i];
+            }
+        }
+        #[allow(clippy::cast_precision_loss, reason = "a small rank")]
+        let rank = r as f64;
+        (rank / squares).sqrt() / self.row_scale
     }
 
     /// Decides what the stage decides, damped by λ; returns the Euclidean norm of what its rows then miss.
     pub(super) fn decide(&mut self, damping: f64) -> f64 {
-        let (f, n, w, r) = (self.free, self.costed, self.width, self.rank);
-        let below = &self.rows[self.free_rank * w..self.height * w];
-        if damping == 0.0 && below.len() / w == r {
+        let (f, n, w, r) = (self.free, self.costed, self.width, self.found.costed);
+        let (below, height) = (
+            &self.rows[self.found.free * w..self.height * w],
+            self.height - self.found.free,
+        );
+        if damping == 0.0 && height == r {
             for i in 0..r {
                 let row = &below[i * w..(i + 1) * w];
                 let known: f64 = row[f..f + i].iter().zip(&self.decided).map(|(l, x)| l * x).sum();
@@ -204,8 +284,8 @@ impl Stage {
             return 0.0;
         }
         self.decide_by_least_squares(damping);
-        let below = self.rows[self.free_rank * w..self.height * w].chunks_exact(w);
-        let missed = below.map(|row| {
+        let (below, _) = self.below();
+        let missed = below.chunks_exact(w).map(|row| {
             let made: f64 = row[f..f + r].iter().zip(&self.decided).map(|(l, x)| l * x).sum();
             (made - row[f + n]).powi(2)
         });
@@ -214,8 +294,8 @@ impl Stage {
 
     /// `minimise ‖L w − y‖² + λ² ‖w‖²` by reflections of `[L y; λ1 0]` from the left.
     fn decide_by_least_squares(&mut self, damping: f64) {
-        let (f, n, w, r) = (self.free, self.costed, self.width, self.rank);
-        let below = &self.rows[self.free_rank * w..self.height * w];
+        let (f, n, w, r) = (self.free, self.costed, self.width, self.found.costed);
+        let below = &self.rows[self.found.free * w..self.height * w];
         let (height, width) = (below.len() / w + r, r + 1);
         let small = &mut self.small[..height * width];
         small.fill(0.0);
@@ -230,7 +310,7 @@ impl Stage {
             let square: f64 = small[k * width + k..].iter().step_by(width).map(|x| x * x).sum();
             let (norm, head) = (square.sqrt(), small[k * width + k]);
             let pivot = -norm.copysign(head);
-            let scale = 1.0 / (norm * (norm + head.abs()));
+            let factor = 1.0 / (norm * (norm + head.abs()));
             small[k * width + k] -= pivot;
             for c in k + 1..width {
                 let mut sum = 0.0;
@@ -238,7 +318,7 @@ impl Stage {
                     sum += row[k] * row[c];
                 }
                 for row in small[k * width..].chunks_exact_mut(width) {
-                    row[c] -= scale * sum * row[k];
+                    row[c] -= factor * sum * row[k];
                 }
             }
             small[k * width + k] = pivot;
@@ -256,13 +336,14 @@ impl Stage {
 
     /// Unknowns that this stage leaves: free ones, costed ones.
     pub(super) fn left(&self) -> (usize, usize) {
-        (self.free - self.free_rank, self.costed - self.rank)
+        (self.free - self.found.free, self.costed - self.found.costed)
     }
 
     /// Writes rows of the next priority, given in the unknowns of this stage (`[F | C | y]`, this stage's width), into
     /// `next` in the unknowns this stage leaves. The given rows are used up.
     pub(super) fn follow(&self, rows: &mut [f64], next: &mut Self) {
-        let (f, n, w, r) = (self.free, self.costed, self.width, self.rank);
+        let (f, n, w, r) = (self.free, self.costed, self.width, self.found.costed);
+        (next.free_scale, next.row_scale) = scales(rows, f, w);
         let (free, costed) = self.left();
         let to = next.clear(free, costed);
         for (row, to) in rows
@@ -270,7 +351,7 @@ impl Stage {
             .zip(to.chunks_exact_mut(free + costed + 1))
         {
             self.sort_free(row);
-            for k in 0..self.free_rank {
+            for k in 0..self.found.free {
                 let top = &self.rows[k * w..(k + 1) * w];
                 let factor = row[k] / top[k];
                 row[k..]
@@ -280,10 +361,10 @@ impl Stage {
             }
             for k in 0..r {
                 let v = &self.reflections[k * n + k..(k + 1) * n];
-                reflect(v, self.scale[k], &mut row[f + k..f + n]);
+                reflect(v, self.factors[k], &mut row[f + k..f + n]);
             }
             let made: f64 = row[f..f + r].iter().zip(&self.decided).map(|(c, x)| c * x).sum();
-            to[..free].copy_from_slice(&row[self.free_rank..f]);
+            to[..free].copy_from_slice(&row[self.found.free..f]);
             to[free..free + costed].copy_from_slice(&row[f + r..f + n]);
             to[free + costed] = row[f + n] - made;
         }
@@ -300,16 +381,16 @@ impl Stage {
 
     /// Writes u and x; on entry they hold, in front, what the stages after this one decided of what it left.
     pub(super) fn finish(&self, u: &mut [f64], x: &mut [f64]) {
-        let (f, n, w, r) = (self.free, self.costed, self.width, self.rank);
+        let (f, n, w, r) = (self.free, self.costed, self.width, self.found.costed);
         x.copy_within(..n - r, r);
         x[..r].copy_from_slice(&self.decided[..r]);
         for k in (0..r).rev() {
             let v = &self.reflections[k * n + k..(k + 1) * n];
-            reflect(v, self.scale[k], &mut x[k..n]);
+            reflect(v, self.factors[k], &mut x[k..n]);
         }
         let mut pivoted = [0.0; MOST_FREE];
-        pivoted[self.free_rank..f].copy_from_slice(&u[..f - self.free_rank]);
-        for k in (0..self.free_rank).rev() {
+        pivoted[self.found.free..f].copy_from_slice(&u[..f - self.found.free]);
+        for k in (0..self.found.free).rev() {
             let row = &self.rows[k * w..(k + 1) * w];
             let costed: f64 = row[f..f + n].iter().zip(&x[..n]).map(|(c, x)| c * x).sum();
             let known: f64 = row[k + 1..f]
@@ -325,13 +406,34 @@ impl Stage {
     }
 }
 
-/// Free unknowns there can be: the six of a root.
-pub(super) const MOST_FREE: usize = 6;
+/// Length of the longest column of F and of the longest row of C of rows `[F | C | y]`.
+fn scales(rows: &[f64], free: usize, width: usize) -> (f64, f64) {
+    let mut columns = [0.0; MOST_FREE];
+    let mut longest = 0.0_f64;
+    for row in rows.chunks_exact(width) {
+        for (square, x) in columns.iter_mut().zip(&row[..free]) {
+            *square += x * x;
+        }
+        longest = longest.max(row[free..width - 1].iter().map(|x| x * x).sum());
+    }
+    (columns.into_iter().fold(0.0, f64::max).sqrt(), longest.sqrt())
+}
+
+/// The largest of numbered squares; number `first` if none is a number.
+fn longest(squares: impl Iterator<Item = (usize, f64)>, first: usize) -> (usize, f64) {
+    squares.fold((first, f64::NAN), |best, next| {
+        if best.1.is_nan() || next.1 > best.1 {
+            next
+        } else {
+            best
+        }
+    })
+}
 
 /// `row ← row (1 − s v vᵀ)`.
 #[inline]
-fn reflect(v: &[f64], scale: f64, row: &mut [f64]) {
-    let sum = scale * v.iter().zip(&*row).map(|(v, x)| v * x).sum::<f64>();
+fn reflect(v: &[f64], factor: f64, row: &mut [f64]) {
+    let sum = factor * v.iter().zip(&*row).map(|(v, x)| v * x).sum::<f64>();
     row.iter_mut().zip(v).for_each(|(x, v)| *x -= sum * v);
 }
 
@@ -438,7 +540,8 @@ mod tests {
                 for damping in [0.0, 1e-3, 0.3] {
                     let case = case(seed, m, f, n);
                     let mut stage = stage(&case);
-                    assert!(stage.factorise(ROUNDING) > 0.0);
+                    stage.factorise(f64::EPSILON);
+                    assert!(stage.independence() > 0.0);
                     stage.decide(damping);
                     let (u, x) = answer(&stage, f, n);
                     let expected = oracle(&case, damping);
@@ -462,7 +565,8 @@ mod tests {
             let copy = case.c.row(1) * 2.0;
             case.c.row_mut(4).copy_from(&copy);
             let mut stage = stage(&case);
-            assert!(stage.factorise(ROUNDING) < ROUNDING);
+            stage.factorise(1e-12);
+            assert!(stage.independence() < 1e-300);
             let missed = stage.decide(0.0);
             let (_, x) = answer(&stage, 0, 7);
             assert!((&x - oracle(&case, 0.0)).amax() < 1e-8);
@@ -477,11 +581,11 @@ mod tests {
                 let (m, f, n) = hard;
                 let (first, second) = (case(seed, m, f, n), case(seed + 77, soft, f, n));
                 let mut a = stage(&first);
-                a.factorise(ROUNDING);
+                a.factorise(f64::EPSILON);
                 a.decide(0.0);
                 let mut b = Stage::new(soft, f, n);
                 a.follow(&mut rows(&second), &mut b);
-                b.factorise(ROUNDING);
+                b.factorise_followed(f64::EPSILON);
                 let missed = b.decide(0.0);
                 let (mut u, mut x) = (vec![0.0; f], vec![0.0; n]);
                 b.finish(&mut u, &mut x);

@@ -3,7 +3,7 @@
 //!
 //! Joints stand in the order of the columns of the network matrix: root chain, real joints, task chains.
 
-use super::circuits::{Circuits, Group, RootChain};
+use super::circuits::{Circuits, Group};
 use ik_core::problem::{PhaseId, Problem};
 use ik_core::robot::{Robot, Root};
 use ik_core::task::{Priority, Track};
@@ -81,6 +81,8 @@ pub struct Mechanism {
     pub links: Vec<MechanismLink>,
     /// Edges, in the order of columns.
     pub joints: Vec<MechanismJoint>,
+    /// Real joints that follow the coordinate of another (mimic): edges without a column of their own.
+    pub followers: Vec<MechanismJoint>,
     /// Circuits, in the order of rows.
     pub circuits: Vec<MechanismCircuit>,
     /// Task whose chain is the root's, if one is.
@@ -119,6 +121,7 @@ impl Mechanism {
                 kind: LinkKind::Ground,
             }],
             joints: Vec::new(),
+            followers: Vec::new(),
             circuits: Vec::new(),
             imposed_root,
             blocks: circuits
@@ -193,19 +196,21 @@ impl Mechanism {
         joints
     }
 
-    /// One edge per joint coordinate; joints that mimic it share its column.
+    /// One edge per real joint; the first of each coordinate has its column.
     fn real_joints(&mut self, robot: &Robot) {
-        for (coordinate, named) in robot.coordinates().iter().enumerate() {
-            let first = robot.joints().iter().position(|j| j.coordinate == coordinate);
-            let child = first.map_or(0, |i| i + 1);
-            let parent = first.map_or(0, |i| robot.joints()[i].parent);
-            self.joints.push(MechanismJoint {
-                name: named.name.clone(),
-                from: body_link(parent),
-                to: body_link(child),
-                chain: None,
-                role: Role::Secondary,
-            });
+        for coordinate in 0..robot.coordinates().len() {
+            let joints = robot.joints().iter().enumerate();
+            let mut edges = joints
+                .filter(|(_, joint)| joint.coordinate == coordinate)
+                .map(|(i, joint)| MechanismJoint {
+                    name: joint.name.clone(),
+                    from: body_link(joint.parent),
+                    to: body_link(i + 1),
+                    chain: None,
+                    role: Role::Secondary,
+                });
+            self.joints.extend(edges.next());
+            self.followers.extend(edges);
         }
     }
 
@@ -234,6 +239,7 @@ impl Mechanism {
             .iter()
             .map(|&i| robot.joints()[i].coordinate)
             .collect();
+        path.sort_unstable();
         path.dedup();
         let virtual_joints = self.chain(name, body_link(body), &axes);
         self.circuit(robot, name, &path, &virtual_joints, 6);
@@ -286,7 +292,7 @@ fn block(problem: &Problem, group: &Group) -> MechanismBlock {
     MechanismBlock {
         tasks,
         joints: group.joints.iter().map(|joint| root + joint).collect(),
-        free_root: group.root == RootChain::Free,
+        free_root: group.root.is_unknown(),
         imposed: group.hard.iter().map(|c| c.rows).sum(),
         compromised: group.soft.iter().map(|c| c.rows).sum(),
     }

@@ -55,21 +55,21 @@ pub use network::{Network, ReferencePoint};
 
 use crate::registry::{Allowed, Field, Method, MethodInfo, Parameters, Preset};
 use crate::step_qp::stay;
-use circuits::{Circuits, Closing, Damping};
+use circuits::{Circuits, Damping, RootChain};
 use ik_core::configuration::integrate_into;
 use ik_core::evaluator::Evaluator;
 use ik_core::formulation::{
     Declined, Formulation, Honours, Prepared, Solution, Stepper, Termination, Trust, Use,
 };
-use ik_core::kinematics::{Page, forward};
+use ik_core::kinematics::Page;
 use ik_core::problem::Problem;
 use ik_core::robot::Root;
 use ik_core::spatial::so3;
-use ik_core::step::{ControlStep, Window};
-use nalgebra::{DMatrix, Vector3};
+use ik_core::step::ControlStep;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-use virtual_chain::Instant;
+use virtual_chain::{Instant, closure_into};
 
 /// How targets move between the samples of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -135,11 +135,11 @@ pub struct DaviesParameters {
     pub integrator: Integrator,
     /// λ of hard rows.
     pub damping: f64,
-    /// λ of compromised rows at a singularity.
+    /// λ of compromised rows at a singularity, in parts of the longest row.
     pub soft_damping: f64,
-    /// Least pivot, as part of the largest, from which compromised rows are not damped.
+    /// Independence of the compromised rows from which they are not damped.
     pub soft_threshold: f64,
-    /// Least λ of hard rows that are dependent.
+    /// λ of hard rows at a singularity, in parts of the longest row.
     pub singular_damping: f64,
 }
 
@@ -151,10 +151,8 @@ impl Default for DaviesParameters {
             orientation: OrientationRates::AngularVelocity,
             integrator: Integrator::Euler,
             damping: 0.0,
-            // Empirical: on coman/squat, stretch and lean 0.01 was thrown by the hip's limit, 0.1 lags by 16 mm through the
-            // straight legs; a threshold of 0.3 begins to damp the squat, 0.03 lets the soles slip by 80 mm.
-            soft_damping: 0.03,
-            soft_threshold: 0.1,
+            soft_damping: 0.5,
+            soft_threshold: 0.25,
             singular_damping: 1e-2,
         }
     }
@@ -162,6 +160,11 @@ impl Default for DaviesParameters {
 
 const DAMPING: Allowed = Allowed::Number {
     least: 0.0,
+    largest: 1e3,
+};
+/// Never zero: rounding must not be divided by.
+const RELATIVE: Allowed = Allowed::Number {
+    least: 1e-6,
     largest: 1e3,
 };
 
@@ -202,27 +205,21 @@ impl Parameters for DaviesParameters {
         },
         Field {
             key: "soft_damping",
-            unit: "m, rad",
-            meaning: "lambda of the compromised rows at a singularity, fading out away from it",
-            allowed: DAMPING,
+            unit: "-",
+            meaning: "lambda of the compromised rows at a singularity in parts of the longest row, fading out away from it",
+            allowed: RELATIVE,
         },
         Field {
             key: "soft_threshold",
             unit: "-",
-            meaning: "least pivot of the compromised rows, as part of the largest, from which they are not damped",
-            allowed: Allowed::Number {
-                least: 1e-9,
-                largest: 1.0,
-            },
+            meaning: "independence of the compromised rows (about 1 / condition number) from which they are not damped",
+            allowed: RELATIVE,
         },
         Field {
             key: "singular_damping",
-            unit: "m, rad",
-            meaning: "least lambda of hard rows that are dependent",
-            allowed: Allowed::Number {
-                least: 1e-6,
-                largest: 1e3,
-            },
+            unit: "-",
+            meaning: "lambda of the hard rows at a singularity in parts of the longest row; none below a condition of 1e5",
+            allowed: RELATIVE,
         },
     ];
 }
@@ -268,9 +265,12 @@ impl Formulation for Davies {
         let (mut phases, mut notes) = (Vec::new(), Vec::new());
         for phase in problem.phases() {
             let mut circuits = Circuits::new(problem, phase);
-            if let Some(note) = check_mobility(problem, &mut circuits)? {
-                notes.push(format!("phase `{}`: {note}", phase.name));
-            }
+            let remarks = check_mobility(problem, &mut circuits)?;
+            notes.extend(
+                remarks
+                    .into_iter()
+                    .map(|note| format!("phase `{}`: {note}", phase.name)),
+            );
             phases.push(circuits);
         }
         let stepper = DaviesStepper {
@@ -282,6 +282,7 @@ impl Formulation for Davies {
             v: vec![0.0; robot.nv()],
             increment: vec![0.0; robot.nv()],
             dq: vec![0.0; robot.nv()],
+            corrections: vec![0.0; problem.nxdot()],
         };
         let honours = Honours {
             boundary: false,
@@ -311,6 +312,8 @@ struct DaviesStepper {
     /// Increment from q⁻ to the configuration of the next evaluation.
     increment: Vec<f64>,
     dq: Vec<f64>,
+    /// `K (x − m)` at the beginning of the step, one number per rate of the targets.
+    corrections: Vec<f64>,
 }
 
 impl Stepper for DaviesStepper {
@@ -318,17 +321,19 @@ impl Stepper for DaviesStepper {
         stay(step, out);
         self.v.fill(0.0);
         self.dq.fill(0.0);
-        let (mut dependent, mut missed) = (false, 0.0);
-        for &(tau, previous, weight) in self.parameters.integrator.stages() {
-            if !eval.meter.next_major() {
-                return Termination::Budget;
-            }
+        let stages = self.parameters.integrator.stages();
+        if (eval.meter.majors_left() as usize) < stages.len() {
+            return Termination::Budget;
+        }
+        let (mut damped, mut missed_squared) = (false, 0.0_f64);
+        for &(tau, previous, weight) in stages {
+            eval.meter.next_major();
             for (d, v) in self.increment.iter_mut().zip(&self.v) {
                 *d = previous * step.dt_s * v;
             }
             let quality = self.rates(step, tau, eval);
-            dependent |= quality.dependent;
-            missed += weight * quality.missed_squared;
+            damped |= quality.damped;
+            missed_squared = missed_squared.max(quality.missed_squared);
             for (d, v) in self.dq.iter_mut().zip(&self.v) {
                 *d += weight * step.dt_s * v;
             }
@@ -337,8 +342,8 @@ impl Stepper for DaviesStepper {
         for (v, d) in out.v.iter_mut().zip(&self.dq) {
             *v = d / step.dt_s;
         }
-        if dependent {
-            let residual = f64::sqrt(missed) * step.dt_s;
+        if damped {
+            let residual = missed_squared.sqrt() * step.dt_s;
             return Termination::Damped { residual };
         }
         Termination::Stepped
@@ -354,13 +359,25 @@ impl DaviesStepper {
         integrate_into(robot, step.q_prev, &self.increment, &mut self.q);
         eval.pass(&self.q, &mut self.page);
         let p = &self.parameters;
+        if tau == 0.0 {
+            let (measured, target) = ((&self.q[..], &self.page), step.targets.previous());
+            let gain = p.correction / step.dt_s;
+            closure_into(
+                &self.problem,
+                measured,
+                target,
+                p.orientation,
+                gain,
+                &mut self.corrections,
+            );
+        }
         let instant = Instant {
             targets: step.targets,
             dt_s: step.dt_s,
             tau,
-            correction: p.correction / step.dt_s,
             between: p.rates,
             rates: p.orientation,
+            corrections: &self.corrections,
         };
         let damping = Damping {
             hard: p.damping,
@@ -381,81 +398,51 @@ impl DaviesStepper {
     }
 }
 
-/// Singular values below this part of the largest are zero where mobility is counted: at a generic posture independent
-/// rows of a robot stay above 1e-4, dependent ones are rounding.
-const RANK_TOLERANCE: f64 = 1e-9;
-/// Postures at which mobility is counted; the largest rank is the generic one.
+/// Postures at which ranks are counted; the largest rank is the generic one.
 const GENERIC_POSTURES: usize = 3;
 
-/// Compares what hard tasks impose with what the mechanism, and each group of circuits in it, can do. A note if they leave
-/// freedom.
-fn check_mobility(problem: &Problem, circuits: &mut Circuits) -> Result<Option<String>, Declined> {
+/// Counts the ranks and compares what hard tasks impose with what the mechanism, and each group of circuits in it, can do.
+/// Remarks if they leave freedom.
+fn check_mobility(problem: &Problem, circuits: &mut Circuits) -> Result<Vec<String>, Declined> {
     let robot = problem.robot();
-    let root = robot.root().nv();
+    let postures: Vec<_> = (0..GENERIC_POSTURES).map(|k| generic_posture(robot, k)).collect();
+    circuits.count_ranks(problem, &postures);
+    let name = |task: &usize| problem.tasks()[*task].name.clone();
+    let groups = circuits.imposed();
     let fixed = circuits.imposed_root.map_or(0, |_| 6);
-    let mobility = root + robot.coordinates().len();
-    let ranks: Vec<Ranked> = (0..circuits.groups.len())
-        .map(|g| generic_rank(problem, circuits, g))
-        .collect();
-    let imposed = fixed + ranks.iter().map(|r| r.imposed).sum::<usize>();
-    let rank = fixed + ranks.iter().map(|r| r.rank).sum::<usize>();
+    let mobility = robot.nv();
+    let imposed = fixed + groups.iter().map(|g| g.rows).sum::<usize>();
     if imposed > mobility {
-        let root = circuits.imposed_root.map(|t| problem.tasks()[t].name.clone());
-        let tasks = root
-            .into_iter()
-            .chain(ranks.into_iter().flat_map(|r| r.tasks))
-            .collect();
+        let tasks = groups.iter().flat_map(|g| &g.tasks);
         return Err(Declined::Mobility {
             imposed,
             mobility,
-            rank,
-            tasks,
+            rank: fixed + groups.iter().map(|g| g.rank).sum::<usize>(),
+            tasks: circuits.imposed_root.iter().chain(tasks).map(name).collect(),
         });
     }
-    if let Some(worst) = ranks.into_iter().find(|r| r.rank < r.imposed) {
+    if let Some(worst) = groups.iter().find(|g| g.rank < g.rows) {
         return Err(Declined::Mobility {
-            imposed: worst.imposed,
+            imposed: worst.rows,
             mobility: worst.mobility,
             rank: worst.rank,
-            tasks: worst.tasks,
+            tasks: worst.tasks.iter().map(name).collect(),
         });
     }
+    let mut notes = Vec::new();
     let spare = mobility - imposed;
-    Ok((spare > 0).then(|| {
-        format!(
+    if spare > 0 {
+        notes.push(format!(
             "redundant: hard tasks impose {imposed} on a mobility of {mobility}; the other {spare} go to compromised \
              tasks, then to the least joint rates"
-        )
-    }))
-}
-
-/// What the hard tasks of one group impose, and how many of those coordinates are independent.
-struct Ranked {
-    imposed: usize,
-    mobility: usize,
-    rank: usize,
-    tasks: Vec<String>,
-}
-
-fn generic_rank(problem: &Problem, circuits: &mut Circuits, g: usize) -> Ranked {
-    let robot = problem.robot();
-    let group = &circuits.groups[g];
-    let imposed = group.hard.iter().map(|c| c.rows).sum();
-    let unknown = group.joints.len() + group.root.unknowns();
-    let mut tasks: Vec<String> = group
-        .hard
-        .iter()
-        .map(|c| problem.tasks()[c.task].name.clone())
-        .collect();
-    tasks.dedup();
-    let rank = (0..GENERIC_POSTURES).map(|k| rank_at(problem, circuits, g, &generic_posture(robot, k)));
-    let rank = rank.max().unwrap_or(0);
-    Ranked {
-        imposed,
-        mobility: unknown,
-        rank,
-        tasks,
+        ));
     }
+    if circuits.groups.iter().any(|g| g.root == RootChain::Costed) {
+        notes.push(
+            "no task holds the whole root: its rates are kept least with those of the joints".to_owned(),
+        );
+    }
+    Ok(notes)
 }
 
 /// A posture without symmetry: multiples of the golden ratio, joints within ±1.
@@ -465,31 +452,4 @@ fn generic_posture(robot: &ik_core::robot::Robot, k: usize) -> Vec<f64> {
     let number = |i: usize| 2.0 * ((1 + i + 97 * k) as f64 * GOLDEN).fract() - 1.0;
     let dq: Vec<f64> = (0..robot.nv()).map(number).collect();
     ik_core::configuration::integrate(robot, &robot.neutral(), &dq)
-}
-
-fn rank_at(problem: &Problem, circuits: &mut Circuits, g: usize, q: &[f64]) -> usize {
-    let mut page = Page::new(problem.robot());
-    forward(problem.robot(), q, &mut page);
-    let resting = vec![0.0; 2 * (problem.nx() + problem.nxdot())];
-    let instant = Instant {
-        targets: Window::new(&resting, problem.nx(), problem.nxdot()).expect("two whole samples"),
-        dt_s: 1.0,
-        tau: 0.0,
-        correction: 0.0,
-        between: Between::Line,
-        rates: OrientationRates::AngularVelocity,
-    };
-    let at = Closing {
-        problem,
-        q,
-        page: &page,
-        instant: &instant,
-    };
-    let (rows, width) = circuits.hard_rows(g, &at);
-    let matrix = DMatrix::from_row_slice(rows.len() / width, width, rows).remove_column(width - 1);
-    if matrix.is_empty() {
-        return 0;
-    }
-    let values = matrix.singular_values();
-    values.iter().filter(|&&s| s > RANK_TOLERANCE * values[0]).count()
 }

@@ -13,6 +13,9 @@ use ik_core::spatial::screw::Screw;
 use ik_core::task::Track;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
+/// Singular values below this part of the largest are zero: independent rows stay far above, rounding far below.
+const RANK_TOLERANCE: f64 = 1e-9;
+
 /// The point at which the rows of a circuit are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReferencePoint {
@@ -75,16 +78,20 @@ impl Network {
 
     /// Number of singular values of `matrix` above 1e-9 of its largest.
     pub fn rank(matrix: &DMatrix<f64>) -> usize {
+        if matrix.is_empty() {
+            return 0;
+        }
         let values = matrix.singular_values();
-        values
-            .iter()
-            .filter(|&&s| s > super::RANK_TOLERANCE * values[0])
-            .count()
+        values.iter().filter(|&&s| s > RANK_TOLERANCE * values[0]).count()
     }
 
-    /// Largest over least singular value of N_s; infinite if it is singular.
+    /// Largest over least singular value of N_s; infinite if it is singular, 1 if nothing is unknown.
     pub fn condition(&self) -> f64 {
-        let values = self.secondary().singular_values();
+        let secondary = self.secondary();
+        if secondary.is_empty() {
+            return 1.0;
+        }
+        let values = secondary.singular_values();
         values[0] / values[values.len() - 1]
     }
 }

@@ -40,90 +40,101 @@ pub(super) struct Instant<'a> {
     pub(super) targets: Window<'a>,
     pub(super) dt_s: f64,
     pub(super) tau: f64,
-    /// K (1/s).
-    pub(super) correction: f64,
     pub(super) between: Between,
     pub(super) rates: OrientationRates,
+    /// Correction rates `K (x − m)` of all tasks as [`closure_into`] wrote them at the beginning of the step. They are held
+    /// during the step: measured anew at every evaluation they would only partly be made up for.
+    pub(super) corrections: &'a [f64],
 }
 
-impl Instant<'_> {
-    /// The twist that imposes the target of task `task` on its chain, measured at the page's configuration:
-    /// `ẋ_d + K (x_d − m)` in the chain's coordinates.
+impl<'a> Instant<'a> {
+    /// Targets that rest at zero, nothing to correct: two samples and more of zeros.
+    pub(super) fn resting(problem: &Problem, zeros: &'a [f64]) -> Self {
+        Self {
+            targets: Window::new(zeros, problem.nx(), problem.nxdot()).expect("two whole samples"),
+            dt_s: 1.0,
+            tau: 0.0,
+            between: Between::Line,
+            rates: OrientationRates::AngularVelocity,
+            corrections: &zeros[..problem.nxdot()],
+        }
+    }
+
+    /// The twist that imposes the target of task `task` on its chain at the page's configuration.
     pub(super) fn twist(&self, problem: &Problem, task: usize, page: &Page) -> ImposedTwist {
         let robot = problem.robot();
         let slot = problem.slots()[task];
-        let position = |now: Vector3<f64>| self.linear(slot, now);
-        let turn = |frame: FrameId, offset: usize| {
-            let slot = Slot {
-                x: slot.x + offset,
-                xdot: slot.xdot + offset,
-            };
+        let none = Vector3::zeros();
+        let turn = |frame: FrameId, slot: Slot| {
             self.angular(problem.orientation(), slot, &page.frame_rotation(robot, frame))
         };
-        let none = Vector3::zeros();
         let (linear, angular) = match problem.tasks()[task].track {
-            Track::Position(f) => (position(page.frame_position(robot, f)), none),
-            Track::Orientation(f) => (none, turn(f, 0)),
-            Track::Pose(f) => (position(page.frame_position(robot, f)), turn(f, 3)),
-            Track::CentreOfMass => (position(page.centre_of_mass()), none),
+            Track::Position(_) | Track::CentreOfMass => (self.linear(slot), none),
+            Track::Orientation(f) => (none, turn(f, slot)),
+            Track::Pose(f) => (self.linear(slot), turn(f, angular_part(slot))),
             Track::Posture => (none, none),
         };
         ImposedTwist { linear, angular }
     }
 
-    /// Imposed rate of the virtual joint beside joint coordinate `j`, which stands at `now`, of a posture task.
-    pub(super) fn joint_rate(&self, slot: Slot, j: usize, now: f64) -> f64 {
-        let (before, after) = (self.targets.previous(), self.targets.now());
+    /// Imposed rate of the virtual joint beside joint coordinate `j` of a posture task.
+    pub(super) fn joint_rate(&self, slot: Slot, j: usize) -> f64 {
         let end = |s: Sample<'_>| (s.x[slot.x + j], s.xdot[slot.xdot + j]);
-        let (wanted, rate) = self.interpolate(end(before), end(after));
-        rate + self.correction * (wanted - now)
+        let (_, rate) = self.interpolate(end(self.targets.previous()), end(self.targets.now()));
+        rate + self.corrections[slot.xdot + j]
     }
 
-    fn linear(&self, slot: Slot, now: Vector3<f64>) -> Vector3<f64> {
+    fn correction(&self, slot: Slot) -> Vector3<f64> {
+        Vector3::from_column_slice(&self.corrections[slot.xdot..slot.xdot + 3])
+    }
+
+    fn linear(&self, slot: Slot) -> Vector3<f64> {
         let at = |s: &[f64], first: usize| Vector3::from_column_slice(&s[first..first + 3]);
         let end = |s: Sample<'_>| (at(s.x, slot.x), at(s.xdot, slot.xdot));
-        let (wanted, rate) = self.between(end(self.targets.previous()), end(self.targets.now()));
-        rate + (wanted - now) * self.correction
+        let (_, rate) = self.between(end(self.targets.previous()), end(self.targets.now()));
+        rate + self.correction(slot)
     }
 
     fn angular(&self, how: OrientationCoordinates, slot: Slot, now: &Matrix3<f64>) -> Vector3<f64> {
         let end = |s: Sample<'_>| attitude(how, slot, s);
         let (before, after) = (end(self.targets.previous()), end(self.targets.now()));
         match self.rates {
-            OrientationRates::AngularVelocity => self.by_angular_velocity(before, after, now),
-            OrientationRates::Euler => self.by_euler_rates(before, after, now),
+            OrientationRates::AngularVelocity => self.angular_velocity(before, after) + self.correction(slot),
+            OrientationRates::Euler => {
+                let rate = self.euler_rates(before, after) + self.correction(slot);
+                euler_axes(&euler_angles(now)) * rate
+            }
         }
     }
 
-    fn by_angular_velocity(
+    /// Angular velocity of the target.
+    fn angular_velocity(
         &self,
         (r0, w0): (Matrix3<f64>, Vector3<f64>),
         (r1, w1): (Matrix3<f64>, Vector3<f64>),
-        now: &Matrix3<f64>,
     ) -> Vector3<f64> {
         let turn = so3::log(&(r1 * r0.transpose()));
         let end_rate = so3::left_jacobian_inverse(&turn) * w1;
         let (phi, phi_dot) = self.between((Vector3::zeros(), w0), (turn, end_rate));
-        let wanted = so3::exp(&phi) * r0;
-        so3::left_jacobian(&phi) * phi_dot + so3::log(&(wanted * now.transpose())) * self.correction
+        so3::left_jacobian(&phi) * phi_dot
     }
 
-    fn by_euler_rates(
+    /// Rates of the angles of the target.
+    fn euler_rates(
         &self,
         (r0, w0): (Matrix3<f64>, Vector3<f64>),
         (r1, w1): (Matrix3<f64>, Vector3<f64>),
-        now: &Matrix3<f64>,
     ) -> Vector3<f64> {
         let start = euler_angles(&r0);
         let end = start + wrapped(euler_angles(&r1) - start);
-        let (wanted, rate) = match self.between {
-            Between::Line => self.between((start, Vector3::zeros()), (end, Vector3::zeros())),
+        let none = Vector3::zeros();
+        let (_, rate) = match self.between {
+            Between::Line => self.between((start, none), (end, none)),
             Between::Hermite => {
                 self.between((start, euler_rates(&start, &w0)), (end, euler_rates(&end, &w1)))
             }
         };
-        let measured = euler_angles(now);
-        euler_axes(&measured) * (rate + wrapped(wanted - measured) * self.correction)
+        rate
     }
 
     fn between(
@@ -149,6 +160,60 @@ impl Instant<'_> {
                 let (a, b) = (3.0 * rise - 2.0 * v0 - v1, v0 + v1 - 2.0 * rise);
                 let value = x0 + t * (v0 + t * (a + t * b));
                 (value, (v0 + t * (2.0 * a + 3.0 * t * b)) / dt)
+            }
+        }
+    }
+}
+
+/// Slot of the orientation part of a pose.
+fn angular_part(slot: Slot) -> Slot {
+    Slot {
+        x: slot.x + 3,
+        xdot: slot.xdot + 3,
+    }
+}
+
+/// Writes `K (x − m)` of every task of the problem into `out` (length nxdot, in slots of rates): x the targets of the
+/// beginning of the step, m the chains' coordinates measured at the page's configuration `q`, K in 1/s.
+pub(super) fn closure_into(
+    problem: &Problem,
+    (q, page): (&[f64], &Page),
+    target: Sample<'_>,
+    rates: OrientationRates,
+    correction: f64,
+    out: &mut [f64],
+) {
+    let robot = problem.robot();
+    for (task, slot) in problem.tasks().iter().zip(problem.slots()) {
+        let mut linear = |now: Vector3<f64>| {
+            for k in 0..3 {
+                out[slot.xdot + k] = correction * (target.x[slot.x + k] - now[k]);
+            }
+        };
+        let turn = |frame: FrameId, slot: Slot| {
+            let (wanted, _) = attitude(problem.orientation(), slot, target);
+            let now = page.frame_rotation(robot, frame);
+            match rates {
+                OrientationRates::AngularVelocity => so3::log(&(wanted * now.transpose())),
+                OrientationRates::Euler => wrapped(euler_angles(&wanted) - euler_angles(&now)),
+            }
+        };
+        match task.track {
+            Track::Position(f) => linear(page.frame_position(robot, f)),
+            Track::CentreOfMass => linear(page.centre_of_mass()),
+            Track::Orientation(f) => {
+                let angular = turn(f, *slot) * correction;
+                out[slot.xdot..slot.xdot + 3].copy_from_slice(angular.as_slice());
+            }
+            Track::Pose(f) => {
+                linear(page.frame_position(robot, f));
+                let angular = turn(f, angular_part(*slot)) * correction;
+                out[slot.xdot + 3..slot.xdot + 6].copy_from_slice(angular.as_slice());
+            }
+            Track::Posture => {
+                for (j, now) in q[robot.root().nq()..].iter().enumerate() {
+                    out[slot.xdot + j] = correction * (target.x[slot.x + j] - now);
+                }
             }
         }
     }
@@ -240,7 +305,7 @@ mod tests {
                 targets: Window::new(&data, 1, 1).unwrap(),
                 dt_s: 0.1,
                 tau,
-                correction: 0.0,
+                corrections: &[],
                 between: Between::Hermite,
                 rates: OrientationRates::AngularVelocity,
             };
@@ -268,14 +333,19 @@ mod tests {
                 targets: Window::new(&data, 1, 0).unwrap(),
                 dt_s: dt,
                 tau: 0.0,
-                correction: 1.0 / dt,
+                corrections: &[],
                 between: Between::Line,
                 rates,
             };
             let ends = ((r0, Vector3::zeros()), (r1, Vector3::zeros()));
             let w = match rates {
-                OrientationRates::AngularVelocity => at.by_angular_velocity(ends.0, ends.1, &now),
-                OrientationRates::Euler => at.by_euler_rates(ends.0, ends.1, &now),
+                OrientationRates::AngularVelocity => {
+                    at.angular_velocity(ends.0, ends.1) + so3::log(&(r0 * now.transpose())) / dt
+                }
+                OrientationRates::Euler => {
+                    let closure = wrapped(euler_angles(&r0) - euler_angles(&now)) / dt;
+                    euler_axes(&euler_angles(&now)) * (at.euler_rates(ends.0, ends.1) + closure)
+                }
             };
             let reached = so3::exp(&(w * dt)) * now;
             // What is left is of second order in the turn.
