@@ -2,6 +2,8 @@
 
 use super::{ExplainArgs, Failure};
 use crate::error::InputError;
+use crate::figures::mechanism_svg;
+use crate::records_io::write_atomically;
 use crate::suite::{Case, RobotSpec, Suite, Variation, known_method};
 use ik_core::driver::Driver;
 use ik_core::problem::PhaseId;
@@ -41,6 +43,11 @@ pub(super) fn explain(args: &ExplainArgs, out: &mut dyn Write) -> Result<(), Fai
         writeln!(out, "phase {name}")?;
         graph(&network.mechanism, out)?;
         matrix(&network, out)?;
+        if let Some(file) = &args.svg {
+            let title = format!("{}, phase {name}", suite.id);
+            write_atomically(file, &mechanism_svg(&network.mechanism, &title)?)?;
+            writeln!(out, "  graph     {}", file.display())?;
+        }
     }
     let contestant = entry
         .build(&toml::Table::new())
@@ -91,6 +98,9 @@ fn graph(mechanism: &Mechanism, out: &mut dyn Write) -> io::Result<()> {
         mechanism.joints.len(),
         mechanism.joints.len() - real
     )?;
+    if !mechanism.followers.is_empty() {
+        listed("mimic: ", mechanism.followers.iter().map(|j| j.name.clone()), out)?;
+    }
     writeln!(out, "  circuits  {}", mechanism.circuits.len())?;
     for circuit in &mechanism.circuits {
         let name = |(joint, sense): &(usize, i8)| {

@@ -168,6 +168,9 @@ struct ExplainArgs {
     /// Suite whose problem is explained: an id or the path of a .toml file
     #[arg(long, value_name = "SUITE")]
     suite: Option<String>,
+    /// Draw the graph into this file
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
 }
 
 fn rates(word: &str) -> Result<Rates, String> {

@@ -2,15 +2,15 @@
 
 use super::axis::rough;
 use super::painter::Painter;
-use super::panel::{Curve, Level, Panel, TICK_SIZE};
+use super::panel::{Band, Curve, Level, Panel, TICK_SIZE};
 use super::sheet::{Anchor, Drawing, Key, Point, Sheet, Type, WIDTH, draw, key_width, text_width};
 use super::style::{BLACK, GREY};
 use std::collections::BTreeSet;
 
-const MARGIN: f64 = 12.0;
-const TITLE_SIZE: f64 = 15.0;
-const LINE_HEIGHT: f64 = 20.0;
-const LEGEND_LINE: f64 = 19.0;
+pub(super) const MARGIN: f64 = 12.0;
+pub(super) const TITLE_SIZE: f64 = 15.0;
+pub(super) const LINE_HEIGHT: f64 = 20.0;
+pub(super) const LEGEND_LINE: f64 = 19.0;
 const RIGHT_GAP: f64 = 6.0;
 /// Room for y ticks at least.
 const LEAST_GUTTER: f64 = 34.0;
@@ -108,8 +108,9 @@ impl Figure {
         let panels = || self.rows.iter().flat_map(|r| &r.panels);
         let curves = panels().flat_map(|p| &p.curves).map(Curve::key);
         let levels = panels().flat_map(|p| &p.levels).map(Level::key);
+        let bands = panels().flat_map(|p| &p.bands).map(Band::key);
         let mut keys: Vec<Key> = Vec::new();
-        for key in curves.chain(levels).chain(self.keys.iter().cloned()) {
+        for key in curves.chain(levels).chain(bands).chain(self.keys.iter().cloned()) {
             if !key.name.is_empty() && keys.iter().all(|k| k.name != key.name) {
                 keys.push(key);
             }
@@ -134,7 +135,7 @@ impl Figure {
 }
 
 /// Breaks a remark into lines that fit the page.
-fn wrapped(text: &str) -> Vec<String> {
+pub(super) fn wrapped(text: &str) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split(' ') {
         match lines.last_mut() {
@@ -149,7 +150,7 @@ fn wrapped(text: &str) -> Vec<String> {
 }
 
 /// Places of the legend entries from left to right, line by line.
-fn lay_out_legend(keys: &[Key]) -> Vec<(Point, Key)> {
+pub(super) fn lay_out_legend(keys: &[Key]) -> Vec<(Point, Key)> {
     let (mut x, mut y) = (MARGIN, 0.0);
     let mut placed = Vec::new();
     for key in keys {

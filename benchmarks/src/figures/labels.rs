@@ -1,9 +1,12 @@
 //! How rows are named in figures and tables, and which of several equal ones counts.
 //!
 //! A label is the method id, `literal` after it where the velocity term acts on all rows, and every parameter other than
-//! `n` in which rows of the same method on the same scenario differ.
+//! `n` in which rows of the same method on the same scenario differ. A method whose parameters are all its defaults goes
+//! by its id alone, whoever its rivals are: it is the same contestant on every suite.
 
 use crate::records::Row;
+use crate::runner::recorded;
+use ik_methods::registry::method;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -107,6 +110,16 @@ fn is_same_run(a: &Row, b: &Row) -> bool {
     same_place && a.method == b.method && a.parameters == b.parameters
 }
 
+/// Whether a row's method ran with its defaults, budget apart.
+fn is_default(row: &Row) -> bool {
+    let Ok(entry) = method(&row.method) else {
+        return false;
+    };
+    let defaults = recorded(&entry.defaults());
+    let mut others = row.parameters.iter().filter(|(key, _)| *key != "n");
+    others.all(|(key, value)| defaults.get(key) == Some(value))
+}
+
 fn name<'a>(row: &'a Row, rows: &[&Row]) -> Labelled<'a> {
     let rivals: Vec<&&Row> = rows
         .iter()
@@ -117,7 +130,8 @@ fn name<'a>(row: &'a Row, rows: &[&Row]) -> Labelled<'a> {
         label.push_str(" literal");
     }
     let named_apart = |key: &str| key == "n" || key == "rows";
-    for (key, value) in row.parameters.iter().filter(|(k, _)| !named_apart(k)) {
+    let differing = row.parameters.iter().filter(|(k, _)| !named_apart(k));
+    for (key, value) in differing.filter(|_| !is_default(row)) {
         if rivals.iter().any(|r| r.parameters.get(key) != Some(value)) {
             label.push_str(&format!(" {key}={}", plain(value)));
         }

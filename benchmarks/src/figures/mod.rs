@@ -1,27 +1,32 @@
 //! Figures of a results folder as SVG: those of Faraji & Ijspeert, "Singularity-tolerant inverse kinematics for bipedal
-//! robots: an efficient use of computational power to reduce energy consumption" (2017), and overviews over all suites.
+//! robots: an efficient use of computational power to reduce energy consumption" (2017), those of Davies' method on the
+//! Bioloid (`davies_*`), and overviews over all suites.
 //!
-//! Everything is drawn from the rows and traces of the folder and from nothing else: the same folder gives the same
-//! bytes. Where several rows of a suite differ in Δt, the figures show that of the last.
+//! Everything is drawn from the rows and traces of the folder, and from the embedded suites where a figure shows the
+//! robot, its mechanism or the knots of its walk: the same folder gives the same bytes. Where several rows of a suite differ in Δt, the figures show that of the last.
 
 mod axis;
 mod boundary;
+mod davies;
 mod family;
 mod figure;
 pub(crate) mod labels;
 mod lean;
+mod mechanism;
 mod overview;
 mod painter;
 mod panel;
 mod posture;
 mod regulator;
 mod sheet;
+mod skeleton;
 mod style;
 mod tracking;
 
 use crate::records::{Row, Trace};
 use crate::records_io::{ROWS_FILE, RecordError, read_rows, read_trace, write_atomically};
 use labels::{Labelled, labelled};
+pub use mechanism::mechanism_svg;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use style::Styles;
@@ -142,7 +147,7 @@ fn remove_stale(path: &Path) -> Result<(), RecordError> {
 
 type Paint = fn(&mut Studio<'_>) -> Result<String, Obstacle>;
 
-const FIGURES: [(&str, Paint); 13] = [
+const FIGURES: [(&str, Paint); 22] = [
     ("fig1_squat.svg", tracking::squat),
     ("fig2_stretch.svg", tracking::stretch),
     ("fig2_stretch_fast.svg", tracking::stretch_fast),
@@ -152,6 +157,15 @@ const FIGURES: [(&str, Paint); 13] = [
     ("fig5_boundary.svg", boundary::boundary),
     ("fig6_regulator.svg", regulator::regulator),
     ("fig7_posture.svg", posture::posture),
+    ("davies_graph.svg", davies::graph),
+    ("davies_fig6_7_feet.svg", davies::feet),
+    ("davies_fig8_9_waist.svg", davies::waist),
+    ("davies_fig10_strip.svg", davies::strip),
+    ("davies_fig11_12_balance.svg", davies::balance),
+    ("davies_fig13_joints.svg", davies::joints),
+    ("davies_closure.svg", davies::closure),
+    ("davies_condition.svg", davies::condition),
+    ("davies_damping.svg", davies::damping),
     ("overview_error.svg", overview::error),
     ("overview_time.svg", overview::time),
     ("overview_majors.svg", overview::majors),
@@ -159,6 +173,7 @@ const FIGURES: [(&str, Paint); 13] = [
 ];
 
 /// Why one figure is not drawn.
+#[derive(Debug)]
 enum Obstacle {
     NoData(String),
     Record(RecordError),

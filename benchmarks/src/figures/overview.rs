@@ -60,7 +60,10 @@ pub(super) fn hard(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
 
 fn overview(studio: &Studio<'_>, title: &str, label: &str, metric: Metric) -> Result<String, Obstacle> {
     let axis = common_axis(studio, label, metric)?;
-    let suites = studio.suites();
+    let (suites, without): (Vec<&str>, Vec<&str>) = studio
+        .suites()
+        .into_iter()
+        .partition(|suite| has_data(studio, suite, metric));
     let rows = suites.chunks(2).map(|pair| {
         let runs: Vec<Vec<Labelled<'_>>> = pair.iter().map(|s| studio.runs_of_suite(s)).collect();
         let lines = runs.iter().map(|r| by_method(r).len()).max().unwrap_or_default();
@@ -70,9 +73,11 @@ fn overview(studio: &Studio<'_>, title: &str, label: &str, metric: Metric) -> Re
             .map(|(s, r)| suite_panel(s, r, &axis, lines, metric));
         PanelRow::new(REST + LINE * lines as f64, panels.collect())
     });
-    let remark = "One mark per scenario; the line spans them, the bar is their median.";
-    let mut figure =
-        Figure::new(format!("{title}, all suites"), rows.collect()).with_remarks(vec![remark.to_owned()]);
+    let mut remarks = vec!["One mark per scenario; the line spans them, the bar is their median.".to_owned()];
+    if !without.is_empty() {
+        remarks.push(format!("Without this quantity: {}.", without.join(", ")));
+    }
+    let mut figure = Figure::new(format!("{title}, all suites"), rows.collect()).with_remarks(remarks);
     let keys = [("survived", SURVIVED), ("did not survive", LOST)];
     figure.keys = keys
         .map(|(name, style)| Key {
@@ -82,6 +87,13 @@ fn overview(studio: &Studio<'_>, title: &str, label: &str, metric: Metric) -> Re
         })
         .to_vec();
     Ok(figure.render()?)
+}
+
+/// Whether a panel of the suite shows something: a value, or that all methods declined.
+fn has_data(studio: &Studio<'_>, suite: &str, metric: Metric) -> bool {
+    let runs = studio.runs_of_suite(suite);
+    let mut metrics = runs.iter().filter_map(|r| r.row.metrics.as_ref()).peekable();
+    metrics.peek().is_none() || metrics.any(|m| metric(m).is_some())
 }
 
 /// The axis on which all values of the metric lie.

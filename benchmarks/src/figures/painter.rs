@@ -1,7 +1,7 @@
 //! Painting of one panel: frame, grid, ticks, labels, and what it shows.
 
 use super::axis::FittedAxis;
-use super::panel::{Curve, LEVEL, Level, Markers, Panel, TICK_SIZE};
+use super::panel::{Band, Curve, LEVEL, Level, Markers, Panel, TICK_SIZE};
 use super::sheet::{Anchor, Drawing, Point, Sheet, Stroke, Type};
 use super::style::{BLACK, Dash, GREY, PALE};
 use plotters::style::RGBColor;
@@ -36,7 +36,6 @@ impl<'a, 'b> Painter<'a, 'b> {
         size: Point,
         gutter: f64,
     ) -> Self {
-        let (x, y) = panel.fitted();
         let label = if panel.y.label.is_empty() {
             0.0
         } else {
@@ -48,20 +47,26 @@ impl<'a, 'b> Painter<'a, 'b> {
             } else {
                 BOTTOM_LABEL
             };
+        let (left, right) = (corner.0 + label + gutter + 8.0, corner.0 + size.0 - RIGHT);
+        let (top, bottom) = (corner.1 + TOP, corner.1 + size.1 - below);
+        let (x, y) = panel.fitted_to(right - left, bottom - top);
         Self {
             sheet,
             panel,
             x,
             y,
             gutter,
-            left: corner.0 + label + gutter + 8.0,
-            right: corner.0 + size.0 - RIGHT,
-            top: corner.1 + TOP,
-            bottom: corner.1 + size.1 - below,
+            left,
+            right,
+            top,
+            bottom,
         }
     }
 
     pub(super) fn paint(&self) -> Drawing {
+        for band in &self.panel.bands {
+            self.band(band)?;
+        }
         self.grid()?;
         self.labels()?;
         if self.panel.is_empty() {
@@ -149,6 +154,15 @@ impl<'a, 'b> Painter<'a, 'b> {
             (beside, (self.top + self.bottom) / 2.0),
             look(Anchor::Upwards),
         )
+    }
+
+    fn band(&self, band: &Band) -> Drawing {
+        // False also where one of them is not a number.
+        let there = band.points.iter().filter(|(_, low, high)| low <= high);
+        let upper = there.clone().map(|p| self.at((p.0, p.2)));
+        let lower = there.rev().map(|p| self.at((p.0, p.1)));
+        self.sheet
+            .area(&upper.chain(lower).collect::<Vec<_>>(), band.colour)
     }
 
     fn level(&self, level: &Level) -> Drawing {

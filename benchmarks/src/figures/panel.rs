@@ -49,6 +49,24 @@ pub(super) struct Level {
     pub(super) value: f64,
 }
 
+/// A filled area below all curves: between two ordinates, or over the whole height where they are infinite.
+#[derive(Clone, Debug)]
+pub(super) struct Band {
+    /// Entry in the legend.
+    pub(super) name: String,
+    pub(super) colour: RGBColor,
+    /// Abscissa, lower and upper ordinate.
+    pub(super) points: Vec<(f64, f64, f64)>,
+}
+
+/// How the scales of the two axes are related.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Aspect {
+    Free,
+    /// One unit is as long on either axis: the one that has room to spare shows more than its range.
+    Equal,
+}
+
 /// A text in the panel, beginning at a place given in values.
 #[derive(Clone, Debug)]
 pub(super) struct Remark {
@@ -62,6 +80,8 @@ pub(super) struct Panel {
     pub(super) title: String,
     pub(super) x: Axis,
     pub(super) y: Axis,
+    pub(super) aspect: Aspect,
+    pub(super) bands: Vec<Band>,
     pub(super) curves: Vec<Curve>,
     pub(super) dots: Vec<Dot>,
     pub(super) levels: Vec<Level>,
@@ -75,6 +95,8 @@ impl Panel {
             title: title.to_owned(),
             x,
             y,
+            aspect: Aspect::Free,
+            bands: Vec::new(),
             curves,
             dots,
             levels,
@@ -96,6 +118,8 @@ impl Panel {
     fn vertical_values(&self) -> Vec<Vec<f64>> {
         let mut values = self.values(|p| p.1);
         values.push(self.levels.iter().map(|l| l.value).collect());
+        let of_band = |b: &Band| b.points.iter().flat_map(|p| [p.1, p.2]).collect();
+        values.extend(self.bands.iter().map(of_band));
         values
     }
 
@@ -112,6 +136,21 @@ impl Panel {
             self.x.fit(&self.values(|p| p.0), 8),
             self.y.fit(&self.vertical_values(), 6),
         )
+    }
+
+    /// The axes in a frame of this size, as the aspect asks.
+    pub(super) fn fitted_to(&self, width: f64, height: f64) -> (FittedAxis, FittedAxis) {
+        let (x, y) = self.fitted();
+        if self.aspect == Aspect::Free {
+            return (x, y);
+        }
+        let unit = f64::max((x.high - x.low) / width, (y.high - y.low) / height);
+        let around = |axis: &Axis, fitted: &FittedAxis, length: f64, ticks: usize| {
+            let (middle, half) = ((fitted.low + fitted.high) / 2.0, unit * length / 2.0);
+            let widened = axis.clone().with_range(middle - half, middle + half);
+            widened.fit(&[], ticks)
+        };
+        (around(&self.x, &x, width, 8), around(&self.y, &y, height, 6))
     }
 }
 
@@ -133,6 +172,20 @@ impl Curve {
             name: self.name.clone(),
             style: self.style,
             shows,
+        }
+    }
+}
+
+impl Band {
+    pub(super) fn key(&self) -> Key {
+        let style = Style {
+            colour: self.colour,
+            ..LEVEL
+        };
+        Key {
+            name: self.name.clone(),
+            style,
+            shows: Shows::Area,
         }
     }
 }
@@ -160,4 +213,26 @@ pub(super) fn share_y(panels: &mut [Panel]) {
 /// An axis of time.
 pub(super) fn time_axis() -> Axis {
     Axis::new("time (s)", Scale::Linear)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_aspect_widens_one_axis_about_its_middle() {
+        let mut panel = Panel::new(
+            "",
+            Axis::linear("x").with_range(0.0, 2.0),
+            Axis::linear("y").with_range(0.0, 1.0),
+        );
+        let range = |f: FittedAxis| (f.low, f.high);
+        let (x, y) = panel.fitted_to(800.0, 100.0);
+        assert_eq!((range(x), range(y)), ((0.0, 2.0), (0.0, 1.0)));
+        panel.aspect = Aspect::Equal;
+        let (x, y) = panel.fitted_to(800.0, 100.0);
+        assert_eq!((range(x), range(y)), ((-3.0, 5.0), (0.0, 1.0)));
+        let (x, y) = panel.fitted_to(100.0, 100.0);
+        assert_eq!((range(x), range(y)), ((0.0, 2.0), (-0.5, 1.5)));
+    }
 }

@@ -60,6 +60,8 @@ pub(super) enum Shows {
     Line,
     Marker,
     Both,
+    /// A filled area of its colour.
+    Area,
 }
 
 /// Estimated width of a text.
@@ -162,6 +164,12 @@ impl Sheet<'_> {
         self.put(Rectangle::new([pixel(corner), pixel(opposite)], colour.filled()))
     }
 
+    /// A filled polygon.
+    pub(super) fn area(&self, corners: &[Point], colour: RGBColor) -> Drawing {
+        let corners = without_needless(corners.iter().map(|p| pixel(*p)));
+        self.put(Polygon::new(corners, colour.filled()))
+    }
+
     /// The outline of a rectangle.
     pub(super) fn frame(&self, corner: Point, opposite: Point, colour: RGBColor) -> Drawing {
         self.put(Rectangle::new(
@@ -230,10 +238,13 @@ impl Sheet<'_> {
             width: 2.0,
             dash: key.style.dash,
         };
-        if key.shows != Shows::Marker {
+        if key.shows == Shows::Area {
+            self.fill((x, y - 6.0), (x + KEY_LINE, y + 6.0), key.style.colour)?;
+        }
+        if matches!(key.shows, Shows::Line | Shows::Both) {
             self.line(&[(x, y), (x + KEY_LINE, y)], stroke)?;
         }
-        if key.shows != Shows::Line {
+        if matches!(key.shows, Shows::Marker | Shows::Both) {
             self.marker((x + KEY_LINE / 2.0, y), 3.6, key.style.colour, key.style.marker)?;
         }
         let look = Type {

@@ -17,6 +17,12 @@ pub(super) const BLUE: RGBColor = RGBColor(0, 114, 178);
 pub(super) const VERMILLION: RGBColor = RGBColor(213, 94, 0);
 pub(super) const PURPLE: RGBColor = RGBColor(204, 121, 167);
 
+/// Fill where the right foot stands alone, and the left one: light enough for any line on them.
+pub(super) const PALE_BLUE: RGBColor = RGBColor(218, 234, 246);
+pub(super) const PALE_VERMILLION: RGBColor = RGBColor(252, 230, 216);
+/// Fill of an area that a quantity should stay in.
+pub(super) const PALE_GREEN: RGBColor = RGBColor(214, 238, 229);
+
 /// Pattern of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Dash {
@@ -46,6 +52,11 @@ pub(super) struct Style {
     pub(super) dash: Dash,
     pub(super) marker: Marker,
 }
+
+/// Limbs on the right and on the left of a robot, and what is between them.
+pub(super) const RIGHT: Style = style(BLUE, Dash::Solid, Marker::Circle);
+pub(super) const LEFT: Style = style(VERMILLION, Dash::Long, Marker::Square);
+pub(super) const TRUNK: Style = style(BLACK, Dash::Solid, Marker::Diamond);
 
 const fn style(colour: RGBColor, dash: Dash, marker: Marker) -> Style {
     Style { colour, dash, marker }

@@ -1,3 +1,4 @@
+use super::davies::tests::write_walk;
 use super::synthetic::{folder, row, write_results};
 use super::*;
 use crate::records_io::{RowStore, write_trace};
@@ -33,6 +34,7 @@ const SQUAT: [&str; 4] = ["t", "com_error_m", "com_rate_error_m_s", "step_us"];
 fn a_full_run_gives_every_figure_with_its_axes_and_methods() {
     let dir = folder("full");
     write_results(&dir);
+    write_walk(&dir);
     let drawn = draw_into(&dir);
     assert_eq!(drawn.files.len(), FIGURES.len(), "{:?}", drawn.notes);
     assert_eq!(
@@ -111,6 +113,9 @@ fn a_full_run_gives_every_figure_with_its_axes_and_methods() {
         }
     }
     assert!(figure(&dir, "overview_time.svg").contains("declined"));
+    // Neither suite of the Bioloid has a task of the centre of mass.
+    let without = "Without this quantity: bioloid/gait, bioloid/squat.";
+    assert!(figure(&dir, "overview_error.svg").contains(without));
     for path in &drawn.files {
         let svg = std::fs::read_to_string(path).unwrap();
         assert!(
