@@ -14,28 +14,33 @@
 //! the beginning of the step, ẋ their forward difference (`rates = "difference"`) or the given rates (`"analytic"`).
 //! (S3) Eliminate monitored coordinates and a free root by the left null space of their columns, which leaves `A q̇ = y` in
 //! the real joints: square, the solution; fewer rows, the least joint rates; damped where asked for. (S4) Rates of the
-//! root from what was eliminated. (S5) q = q⁻ ⊕ Δt q̇, or the classical Runge-Kutta rule with rows and targets inside the
-//! step, on SO(3) in the manner of Munthe-Kaas.
+//! root from what was eliminated. (S5) q = q⁻ ⊕ Δt q̇, or the classical Runge-Kutta rule with rows and rates inside the
+//! step, on SO(3) in the manner of Munthe-Kaas; K (x − m) is held, so that the rule keeps its order.
 //!
-//! The default `correction` K Δt = 1 is full correction; then q̇_p = (x⁺ − m)/Δt, the form of closed-loop inverse
-//! kinematics. 0 is the open loop, which drifts.
+//! The default `correction` K Δt = 1 is full correction. With forward differences and one evaluation q̇_p is then
+//! (x⁺ − m)/Δt (for orientations to second order), the form of closed-loop inverse kinematics. 0 is the open loop, which
+//! drifts.
 //!
 //! ## What it needs
 //! Targets; their rates if `rates = "analytic"`. A hard pose of a frame on the root link imposes the root; otherwise the
-//! root is free and follows. Hard tasks must not impose more than the mobility, as a whole or on any limb.
+//! root is free and follows. Hard tasks must not impose more than the mobility, as a whole or on any limb. Where all tasks
+//! together leave the root open, its rates are kept least with those of the joints.
 //!
 //! ## Known limits
 //! No boundary. Straight knees and elbows: the circuits lose rank there, rates grow without bound towards them, and an
-//! exactly straight leg does not bend. Dependent rows are damped with `singular_damping` and the step says so.
+//! exactly straight leg does not bend. Hard rows with a condition number beyond 1e5 are damped (`singular_damping`), and the
+//! step says so. Integration is explicit: a frame that is far from the root misses by half the squared turn of the step
+//! times that distance until the next correction.
 //!
 //! ## Source
 //! Method: Davies (1981), Mechanical networks, Mech. Mach. Theory 16; Assur virtual chains: Campos, Guenther & Martins
 //! (2005). Humanoid: the Bioloid paper of `docs/davies.md`, eqs. (1)-(11), (15).
 //!
 //! ## Deviations
-//! Deviation: compromised tasks. The network knows no slack. Their circuits are solved after the hard ones, by damped
-//! least squares in the motions those leave; the damping fades in towards a singularity (`soft_damping`,
-//! `soft_threshold`), away from it they are met exactly. Weights act on world axes.
+//! Deviation: compromised tasks. The network knows no slack. Their circuits are solved after the hard ones, by least
+//! squares in the motions those leave, damped towards a singularity (`soft_damping`, `soft_threshold`) and exact away from
+//! it. Weights act on world axes. Dampings are in parts of the longest row, so units and a common factor of the weights
+//! change nothing.
 //! Deviation: `orientation = "angular-velocity"` by default. The paper's Euler rates impose the same motion but their
 //! chain is singular at ±90 degrees.
 //! Deviation: the circuit of the centre of mass is ours (see `virtual_chain`).
@@ -151,6 +156,8 @@ impl Default for DaviesParameters {
             orientation: OrientationRates::AngularVelocity,
             integrator: Integrator::Euler,
             damping: 0.0,
+            // Empirical: with less damping coman/lean and coman/asymmetric are thrown by straight legs; from a threshold
+            // of 0.3 on bioloid/com-sway, which is far from straight, is damped too.
             soft_damping: 0.5,
             soft_threshold: 0.25,
             singular_damping: 1e-2,
