@@ -556,3 +556,50 @@ fn compromised_rows_are_damped_near_singularities_only() {
     let (fall, fastest) = lowered(1e-3);
     assert!(fall > -0.01 && fastest < 10.0, "{fall} {fastest}");
 }
+
+#[test]
+fn saying_the_same_twice_is_no_singularity() {
+    // A position twice: three rows too many, and nothing to damp.
+    let arm = Arc::new(embedded("arm7").unwrap());
+    let tip = ik_core::robot::FrameId(arm.frames().len() - 1);
+    let problem = problem(
+        &arm,
+        &[
+            ("first", Track::Position(tip), soft()),
+            ("second", Track::Position(tip), soft()),
+        ],
+    );
+    let mut met = 0;
+    for seed in 0..40 {
+        let q = random_posture(&arm, seed);
+        let page = page_at(&problem, &q);
+        let values = ordinary_rows(&problem, 0, &page).singular_values();
+        if values[2] < 0.6 * values[0] {
+            continue;
+        }
+        let x = targets(&problem, &q);
+        let (mut to, _) = moved(&problem, &x, seed, 0.01);
+        let position = problem.slots()[1].x;
+        to.copy_within(0..3, position);
+        let (v, said) = drive(&problem, "correction = 0.0", &q, &x, &to, 1.0);
+        assert_eq!(said, Termination::Stepped);
+        let made = ordinary_rows(&problem, 1, &page) * DVector::from_vec(v);
+        assert!((0..3).all(|k| (made[k] - (to[k] - x[k])).abs() < 1e-12), "{seed}");
+        met += 1;
+    }
+    assert!(met >= 5, "only {met}");
+}
+
+#[test]
+fn what_the_first_evaluation_damps_the_others_do_not_throw() {
+    let robot = bioloid();
+    let problem = problem(&robot, &gait_tasks(&robot, Priority::Hard));
+    let q = robot.neutral();
+    let x = targets(&problem, &q);
+    for seed in 0..5 {
+        let (to, _) = moved(&problem, &x, seed, 1e-3);
+        let (v, said) = drive(&problem, "integrator = 'rk4'", &q, &x, &to, 0.01);
+        assert!(matches!(said, Termination::Damped { .. }));
+        assert!(v.iter().all(|v| v.abs() < 10.0), "{seed} {v:?}");
+    }
+}
