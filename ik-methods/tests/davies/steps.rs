@@ -560,17 +560,17 @@ fn compromised_rows_are_damped_near_singularities_only() {
 
 #[test]
 fn saying_the_same_twice_is_no_singularity() {
-    // A hand placed twice: three rows too many, and nothing to damp.
+    // A foot placed twice: three rows too many, and nothing to damp.
     let robot = bioloid();
-    let hand = robot.frame("r_hand").unwrap();
+    let foot = robot.frame("r_foot").unwrap();
     let tasks = [
         (
             "waist",
             Track::Pose(robot.frame("waist").unwrap()),
             Priority::Hard,
         ),
-        ("hand", Track::Position(hand), soft()),
-        ("again", Track::Position(hand), soft()),
+        ("foot", Track::Position(foot), soft()),
+        ("again", Track::Position(foot), soft()),
     ];
     let problem = problem(&robot, &tasks);
     for seed in 0..10 {
