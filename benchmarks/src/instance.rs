@@ -279,7 +279,7 @@ fn detail(termination: &Termination) -> String {
             format!("linearised hard rows miss by {residual:e} (m, rad)")
         }
         Termination::Damped { residual } => {
-            format!("dependent hard rows were damped; {residual} of them is left")
+            format!("the hard rows were damped; {residual} of them (m, rad) is left")
         }
         Termination::OutOfReach { missing_m } => format!("the target is {missing_m} m out of reach"),
         Termination::Numerical(reason) => (*reason).to_owned(),

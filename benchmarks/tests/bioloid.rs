@@ -70,7 +70,7 @@ fn closure_errors_are_those_of_the_integration() {
     let open = error("correction = 0.0");
     let corrected = error("");
     let euler_rates = error("orientation = 'euler-rates'");
-    let fourth_order = error("correction = 0.0\nintegrator = 'rk4'\nrates = 'analytic'");
+    let fourth_order = error("correction = 0.0\nintegrator = 'rk4'\nfeed_forward = 'given'");
     let all = format!("open {open:e}, corrected {corrected:e}, {euler_rates:e}, RK4 open {fourth_order:e}");
     assert!((5e-3..10e-3).contains(&open), "{all}");
     assert!(corrected < 1e-4 && euler_rates < 1e-4, "{all}");

@@ -92,7 +92,9 @@ pub enum Declined {
         needs: String,
     },
     /// The tasks do not match the robot's mobility.
-    #[error("tasks {tasks:?} impose {imposed} rows of rank {rank} on a mobility of {mobility}")]
+    #[error(
+        "hard tasks impose {imposed} rows of rank {rank} on a mobility of {mobility}: too many are those of {tasks:?}"
+    )]
     Mobility {
         /// Rows imposed.
         imposed: usize,
@@ -100,7 +102,7 @@ pub enum Declined {
         mobility: usize,
         /// Rank found.
         rank: usize,
-        /// The tasks concerned.
+        /// The tasks that impose more than their part of the robot can do.
         tasks: Vec<String>,
     },
     /// Something outside (a program, a file) is missing.
@@ -123,7 +125,7 @@ pub enum Termination {
         /// linearisation for those that take one step.
         residual: f64,
     },
-    /// One step of an integrating method through (nearly) dependent hard rows: it was damped there.
+    /// One step of an integrating method whose hard rows were damped, by choice or because they are nearly dependent.
     Damped {
         /// Euclidean norm of the hard rows that the damping leaves in the linearisation (m and rad mixed).
         residual: f64,

@@ -99,7 +99,7 @@ fn davies(criterion: &mut Criterion) {
         let ahead: Vec<f64> = x.iter().map(|x| x + 1e-4).collect();
         let rest = vec![0.0; problem.nxdot()];
         let data = [&x[..], &rest, &ahead, &rest].concat();
-        for parameters in ["", "integrator = 'rk4'\nrates = 'analytic'"] {
+        for parameters in ["", "integrator = 'rk4'\nfeed_forward = 'given'"] {
             let contestant = method("davies")
                 .unwrap()
                 .build(&parameters.parse().unwrap())

@@ -67,7 +67,7 @@ fn a_step_allocates_nothing_where_it_is_promised() {
             "ik5" => &["", "start = 'curvature'"],
             "davies" => &[
                 "",
-                "integrator = 'rk4'\nrates = 'analytic'",
+                "integrator = 'rk4'\nfeed_forward = 'given'",
                 "orientation = 'euler-rates'",
                 "damping = 0.01",
             ],

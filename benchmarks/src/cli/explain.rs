@@ -77,7 +77,11 @@ fn suite_of(robot: &str) -> Result<Suite, InputError> {
     let found = suites
         .into_iter()
         .find(|suite| id(suite).as_deref() == Some(robot));
-    found.ok_or_else(|| InputError::unknown("explain: --robot", "robot of an embedded suite", robot, known))
+    let allowed = format!(
+        "the robot of an embedded suite ({}), or --suite with a file",
+        known.join(", ")
+    );
+    found.ok_or_else(|| InputError::value("explain", "--robot", robot, &allowed))
 }
 
 fn graph(mechanism: &Mechanism, out: &mut dyn Write) -> io::Result<()> {

@@ -6,7 +6,7 @@
 
 use crate::records::Row;
 use crate::runner::recorded;
-use ik_methods::registry::method;
+use ik_methods::registry::{METHODS, method};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -29,9 +29,13 @@ impl Labelled<'_> {
         }
     }
 
-    /// Place among the methods of a table: by label, numbers in it by value, then by falling n.
-    pub(crate) fn order(&self) -> (Vec<(String, u64)>, std::cmp::Reverse<Option<u64>>) {
+    /// Place among the methods of a table: as registered, then by label, numbers in it by value, then by falling n.
+    pub(crate) fn order(&self) -> (usize, Vec<(String, u64)>, std::cmp::Reverse<Option<u64>>) {
+        let place = METHODS
+            .iter()
+            .position(|entry| entry.info().id == self.row.method);
         (
+            place.unwrap_or(METHODS.len()),
             self.label.split(' ').map(sortable).collect(),
             std::cmp::Reverse(self.n),
         )

@@ -2,7 +2,7 @@
 
 use super::{NONE, hard_max, number, seconds, suites, yes_no};
 use crate::figures::labels::{Labelled, by_method, labelled};
-use crate::records::{Metrics, Row};
+use crate::records::{Metrics, Row, TerminationRecord};
 use std::fmt::Write as _;
 
 /// Columns of the terminal.
@@ -39,7 +39,7 @@ const LEGEND: &str = "
 rms, max: distance of the compromised task that misses its point most. hard: largest miss of a hard
 task (m or rad). exit: when both knees left the straight leg for good. majors: outer iterations per
 step. us: median step time; x ik1: the same relative to ik1. g<=0: inside the ellipse, whatever
-boundary was given. ok: survived.
+boundary was given. ok: survived; decl.: declined, for the reason given.
 ";
 
 /// A table that fits [`TERMINAL_WIDTH`] columns.
@@ -55,16 +55,47 @@ pub fn terminal_table(rows: &[Row]) -> String {
         text.push_str(&format!("\n{suite}\n"));
         let header: Vec<String> = TERMINAL.iter().map(|c| c.0.to_owned()).collect();
         push_line(&mut text, &header);
+        let mut notes = Vec::new();
         for line in terminal_lines(&of_suite) {
-            let mut line_cells = vec![line.scenario, line.method, line.n];
+            let mut line_cells = vec![line.scenario, numbered(line.method, &mut notes), line.n];
             line_cells.extend(line.values);
             push_line(&mut text, &line_cells);
         }
+        for (i, note) in notes.iter().enumerate() {
+            text.push_str(&format!("[{}] {note}\n", i + 1));
+        }
+        text.push_str(&refusals(&of_suite));
     }
     if !text.is_empty() {
         text.push_str(LEGEND);
     }
     text
+}
+
+/// A label that fits its column: one that does not becomes its first word and the number of a note.
+fn numbered(label: String, notes: &mut Vec<String>) -> String {
+    if label.chars().count() <= TERMINAL[1].1 {
+        return label;
+    }
+    let place = notes.iter().position(|note| *note == label).unwrap_or_else(|| {
+        notes.push(label.clone());
+        notes.len() - 1
+    });
+    format!("{} [{}]", label.split(' ').next().unwrap_or_default(), place + 1)
+}
+
+/// Who refused what, and why, each reason once.
+fn refusals(runs: &[&Labelled<'_>]) -> String {
+    let mut lines: Vec<String> = Vec::new();
+    for run in runs {
+        if let TerminationRecord::Declined { reason } = &run.row.termination {
+            let line = format!("{} declined: {reason}\n", run.label);
+            if !lines.contains(&line) {
+                lines.push(line);
+            }
+        }
+    }
+    lines.concat()
 }
 
 fn push_line(text: &mut String, cells: &[String]) {

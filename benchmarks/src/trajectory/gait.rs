@@ -74,7 +74,7 @@ impl Gait {
             place,
             field,
         };
-        let names = &spec.tasks;
+        let names = spec.tasks.of(problem);
         let waist = finder.waist(&names.waist)?;
         let legs = [
             finder.leg("right_foot", &names.right_foot, &waist)?,
@@ -86,6 +86,16 @@ impl Gait {
         ];
         let rows = rows(spec, &walk, &waist, &legs, &arms);
         check_distinct(&rows, problem, place, field)?;
+        if legs[0].rest.y >= legs[1].rest.y {
+            let field = format!("{field}.tasks.right_foot");
+            let found = format!("`{}`, left of `{}`", names.right_foot, names.left_foot);
+            return Err(InputError::value(
+                place,
+                &field,
+                found,
+                "the foot with the smaller y at the zero pose",
+            ));
+        }
         Ok(Self {
             spec: spec.clone(),
             walk,

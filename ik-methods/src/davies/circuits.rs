@@ -114,6 +114,8 @@ fn fade(independence: f64, threshold: f64) -> f64 {
 pub(super) struct Imposed {
     pub(super) rows: usize,
     pub(super) rank: usize,
+    /// What compromised tasks can still have of what is left.
+    pub(super) compromised: usize,
     pub(super) mobility: usize,
     pub(super) tasks: Vec<usize>,
 }
@@ -197,10 +199,11 @@ impl Circuits {
         let imposed = |group: &Group| {
             let mut tasks: Vec<usize> = group.hard.iter().map(|c| c.task).collect();
             tasks.dedup();
-            let ranks = group.stages[0].most();
+            let [rank, compromised] = [0, 1].map(|k| group.stages[k].most()).map(|r| r.free + r.costed);
             Imposed {
                 rows: group.hard.iter().map(|c| c.rows).sum(),
-                rank: ranks.free + ranks.costed,
+                rank,
+                compromised,
                 mobility: group.unknowns(),
                 tasks,
             }

@@ -11,7 +11,7 @@
 //! ```
 //! ## Step
 //! (S1) Measure the virtual coordinates m at q⁻ by forward kinematics. (S2) `q̇_p = ẋ + K (x − m)` with the targets x of
-//! the beginning of the step, ẋ their forward difference (`rates = "difference"`) or the given rates (`"analytic"`).
+//! the beginning of the step, ẋ their forward difference (`feed_forward = "difference"`) or the given rates (`"given"`).
 //! (S3) Eliminate monitored coordinates and a free root by the left null space of their columns, which leaves `A q̇ = y` in
 //! the real joints: square, the solution; fewer rows, the least joint rates; damped where asked for. (S4) Rates of the
 //! root from what was eliminated. (S5) q = q⁻ ⊕ Δt q̇, or the classical Runge-Kutta rule with rows and rates inside the
@@ -22,7 +22,7 @@
 //! drifts.
 //!
 //! ## What it needs
-//! Targets; their rates if `rates = "analytic"`. A hard pose of a frame on the root link imposes the root; otherwise the
+//! Targets; their rates if `feed_forward = "given"`. A hard pose of a frame on the root link imposes the root; otherwise the
 //! root is free and follows. Hard tasks must not impose more than the mobility, as a whole or on any limb. Where all tasks
 //! together leave the root open, its rates are kept least with those of the joints.
 //!
@@ -84,7 +84,7 @@ pub enum Between {
     #[serde(rename = "difference")]
     Line,
     /// On the cubic through both samples with their given rates.
-    #[serde(rename = "analytic")]
+    #[serde(rename = "given")]
     Hermite,
 }
 
@@ -133,7 +133,7 @@ pub struct DaviesParameters {
     /// K Δt.
     pub correction: f64,
     /// Where the rates of the targets come from.
-    pub rates: Between,
+    pub feed_forward: Between,
     /// Revolute coordinates of the virtual chains.
     pub orientation: OrientationRates,
     /// Integration rule.
@@ -152,7 +152,7 @@ impl Default for DaviesParameters {
     fn default() -> Self {
         Self {
             correction: 1.0,
-            rates: Between::Line,
+            feed_forward: Between::Line,
             orientation: OrientationRates::AngularVelocity,
             integrator: Integrator::Euler,
             damping: 0.0,
@@ -187,10 +187,10 @@ impl Parameters for DaviesParameters {
             },
         },
         Field {
-            key: "rates",
+            key: "feed_forward",
             unit: "-",
-            meaning: "target rates: forward differences, or the given ones with a cubic between the samples",
-            allowed: Allowed::Words(&["difference", "analytic"]),
+            meaning: "rates of the targets: forward differences of the samples, or those the suite gives, with a cubic between",
+            allowed: Allowed::Words(&["difference", "given"]),
         },
         Field {
             key: "orientation",
@@ -263,9 +263,9 @@ pub const OPEN_LOOP: Preset = Preset {
 
 impl Formulation for Davies {
     fn prepare(&self, problem: &Arc<Problem>) -> Result<Prepared, Declined> {
-        if self.parameters.rates == Between::Hermite && !problem.supplies().rates {
+        if self.parameters.feed_forward == Between::Hermite && !problem.supplies().rates {
             return Err(Declined::Information {
-                needs: "target rates (parameter rates = \"analytic\")".to_owned(),
+                needs: "target rates (parameter feed_forward = \"given\")".to_owned(),
             });
         }
         let robot = problem.robot();
@@ -382,7 +382,7 @@ impl DaviesStepper {
             targets: step.targets,
             dt_s: step.dt_s,
             tau,
-            between: p.rates,
+            between: p.feed_forward,
             rates: p.orientation,
             corrections: &self.corrections,
         };
@@ -419,16 +419,16 @@ fn check_mobility(problem: &Problem, circuits: &mut Circuits) -> Result<Vec<Stri
     let fixed = circuits.imposed_root.map_or(0, |_| 6);
     let mobility = robot.nv();
     let imposed = fixed + groups.iter().map(|g| g.rows).sum::<usize>();
+    let over: Vec<_> = groups.iter().filter(|g| g.rank < g.rows).collect();
     if imposed > mobility {
-        let tasks = groups.iter().flat_map(|g| &g.tasks);
         return Err(Declined::Mobility {
             imposed,
             mobility,
             rank: fixed + groups.iter().map(|g| g.rank).sum::<usize>(),
-            tasks: circuits.imposed_root.iter().chain(tasks).map(name).collect(),
+            tasks: over.iter().flat_map(|g| &g.tasks).map(name).collect(),
         });
     }
-    if let Some(worst) = groups.iter().find(|g| g.rank < g.rows) {
+    if let Some(worst) = over.first() {
         return Err(Declined::Mobility {
             imposed: worst.rows,
             mobility: worst.mobility,
@@ -437,11 +437,12 @@ fn check_mobility(problem: &Problem, circuits: &mut Circuits) -> Result<Vec<Stri
         });
     }
     let mut notes = Vec::new();
-    let spare = mobility - imposed;
+    let compromised = groups.iter().map(|g| g.compromised).sum::<usize>();
+    let spare = mobility - imposed - compromised;
     if spare > 0 {
         notes.push(format!(
-            "redundant: hard tasks impose {imposed} on a mobility of {mobility}; the other {spare} go to compromised \
-             tasks, then to the least joint rates"
+            "redundant: of a mobility of {mobility} hard tasks impose {imposed} and compromised tasks {compromised}; the \
+             other {spare} go to the least joint rates"
         ));
     }
     if circuits.groups.iter().any(|g| g.root == RootChain::Costed) {

@@ -129,7 +129,7 @@ fn integration_is_of_its_order_for_imposed_and_free_turning_roots() {
         ("mark", Track::Orientation(mark), Priority::Hard),
         ("com", Track::CentreOfMass, Priority::Hard),
     ];
-    let fourth = "integrator = 'rk4'\nrates = 'analytic'\n";
+    let fourth = "integrator = 'rk4'\nfeed_forward = 'given'\n";
     for tasks in [&imposed[..], &free] {
         let problem = problem(&robot, tasks);
         for (parameters, least) in [
@@ -140,7 +140,7 @@ fn integration_is_of_its_order_for_imposed_and_free_turning_roots() {
             ),
             // Each step forgets the error of the one before, and one step's is an order higher.
             (format!("{fourth}correction = 1.0"), 26.0),
-            ("correction = 0.0\nrates = 'analytic'".to_owned(), 1.8),
+            ("correction = 0.0\nfeed_forward = 'given'".to_owned(), 1.8),
             (String::new(), 3.5),
             ("orientation = 'euler-rates'".to_owned(), 3.5),
         ] {

@@ -502,7 +502,7 @@ fn both_ways_to_write_an_attitude_impose_the_same_motion() {
         let data: Vec<f64> = samples.iter().flat_map(written).collect();
         let contestant = method("davies")
             .unwrap()
-            .build(&"rates = 'analytic'".parse().unwrap())
+            .build(&"feed_forward = 'given'".parse().unwrap())
             .unwrap();
         let mut driver = Driver::new(&*contestant.formulation, &problem).unwrap();
         let input = StepInput {

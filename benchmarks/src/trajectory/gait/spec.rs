@@ -1,6 +1,7 @@
 //! How to walk, as it is written in a suite.
 
 use crate::error::{InputError, finite, positive};
+use ik_core::problem::Problem;
 use serde::{Deserialize, Serialize};
 
 /// Most steps of a walk: beyond this a number is taken for a slip.
@@ -46,9 +47,9 @@ pub struct GaitSpec {
     pub hand_drop_m: f64,
 }
 
-/// Names of the tasks that walk.
+/// Names of the tasks that walk. A hand of the default name swings if the problem has such a task.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct GaitTasks {
     /// Pose of the sole of the right foot.
     pub right_foot: String,
@@ -57,10 +58,8 @@ pub struct GaitTasks {
     /// Pose of a frame of the root body.
     pub waist: String,
     /// Position of the right hand, if it swings.
-    #[serde(default)]
     pub right_hand: Option<String>,
     /// Position of the left hand, if it swings.
-    #[serde(default)]
     pub left_hand: Option<String>,
 }
 
@@ -108,6 +107,26 @@ impl Default for GaitTasks {
             right_hand: Some("right-hand".to_owned()),
             left_hand: Some("left-hand".to_owned()),
         }
+    }
+}
+
+impl GaitTasks {
+    /// The same without hands that are there by default only and that the problem does not have.
+    pub(super) fn of(&self, problem: &Problem) -> Self {
+        let (mut tasks, default) = (self.clone(), Self::default());
+        let lacks = |hand: &Option<String>| {
+            problem
+                .tasks()
+                .iter()
+                .all(|task| Some(&task.name) != hand.as_ref())
+        };
+        if tasks.right_hand == default.right_hand && lacks(&tasks.right_hand) {
+            tasks.right_hand = None;
+        }
+        if tasks.left_hand == default.left_hand && lacks(&tasks.left_hand) {
+            tasks.left_hand = None;
+        }
+        tasks
     }
 }
 

@@ -375,6 +375,14 @@ fn tasks_that_cannot_walk_are_refused_by_name() {
             &["gait.tasks = `left-foot` twice", "differ"],
         ),
         (
+            "right_foot = \"right-foot\", left_foot = \"left-foot\"",
+            "right_foot = \"left-foot\", left_foot = \"right-foot\"",
+            &[
+                "gait.tasks.right_foot = `left-foot`, left of `right-foot`",
+                "smaller y",
+            ],
+        ),
+        (
             "waist = \"waist\"",
             "waist = \"left-foot\"",
             &["gait.tasks.waist = `left-foot`", "fixed in the root body"],
@@ -387,6 +395,26 @@ fn tasks_that_cannot_walk_are_refused_by_name() {
     ] {
         refused(from, to, words);
     }
+}
+
+/// Hands of the default names swing where the problem has them, and are no fault where it has not.
+#[test]
+fn hands_that_nobody_named_are_optional() {
+    let text = text();
+    let hands = text.find("[[problem.tasks]]\nname = \"right-hand\"").unwrap();
+    let after = hands + text[hands..].find("\n[starts").unwrap();
+    let handless = [&text[..hands], &text[after..]].concat();
+    let start = handless.find("[scenarios.gait]").unwrap();
+    let rest = start + handless[start..].find("\n# The same walk").unwrap();
+    let case = build(&[&handless[..start], "gait = {}\n", &handless[rest..]].concat()).unwrap();
+    assert_eq!(case.problem.tasks().len(), 3);
+    let named = handless.replacen("gait = {}", "gait = { tasks = { right_hand = \"a-hand\" } }", 1);
+    let message = Case::new(
+        &Suite::parse(&named, "mine.toml", Path::new(".")).unwrap(),
+        1,
+        &Variation::default(),
+    );
+    assert!(message.unwrap_err().to_string().contains("a-hand"));
 }
 
 /// Another robot, without arms: nothing in the generator is about one of them.
