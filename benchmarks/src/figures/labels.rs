@@ -88,6 +88,18 @@ where
     groups
 }
 
+/// A label that fits `width` characters: one that does not becomes its first word and the number of a note.
+pub(crate) fn numbered(label: String, width: usize, notes: &mut Vec<String>) -> String {
+    if label.chars().count() <= width {
+        return label;
+    }
+    let place = notes.iter().position(|note| *note == label).unwrap_or_else(|| {
+        notes.push(label.clone());
+        notes.len() - 1
+    });
+    format!("{} [{}]", label.split(' ').next().unwrap_or_default(), place + 1)
+}
+
 /// A word of a label, a number after `=` apart. The bits of a non-negative f64 sort like its value.
 fn sortable(word: &str) -> (String, u64) {
     let parsed = word

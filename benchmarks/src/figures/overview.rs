@@ -2,7 +2,7 @@
 
 use super::axis::Axis;
 use super::figure::{Figure, PanelRow};
-use super::labels::{Labelled, by_method};
+use super::labels::{Labelled, by_method, numbered};
 use super::panel::{Curve, Dot, Markers, Panel, Remark};
 use super::sheet::{Key, Shows};
 use super::style::{BLACK, Dash, GREY, Marker, Style, VERMILLION};
@@ -64,20 +64,21 @@ fn overview(studio: &Studio<'_>, title: &str, label: &str, metric: Metric) -> Re
         .suites()
         .into_iter()
         .partition(|suite| has_data(studio, suite, metric));
-    let rows = suites.chunks(2).map(|pair| {
+    let mut remarks = vec!["One mark per scenario; the line spans them, the bar is their median.".to_owned()];
+    let mut rows = Vec::new();
+    for pair in suites.chunks(2) {
         let runs: Vec<Vec<Labelled<'_>>> = pair.iter().map(|s| studio.runs_of_suite(s)).collect();
         let lines = runs.iter().map(|r| by_method(r).len()).max().unwrap_or_default();
         let panels = pair
             .iter()
             .zip(&runs)
-            .map(|(s, r)| suite_panel(s, r, &axis, lines, metric));
-        PanelRow::new(REST + LINE * lines as f64, panels.collect())
-    });
-    let mut remarks = vec!["One mark per scenario; the line spans them, the bar is their median.".to_owned()];
+            .map(|(s, r)| suite_panel(s, r, &axis, lines, metric, &mut remarks));
+        rows.push(PanelRow::new(REST + LINE * lines as f64, panels.collect()));
+    }
     if !without.is_empty() {
         remarks.push(format!("Without this quantity: {}.", without.join(", ")));
     }
-    let mut figure = Figure::new(format!("{title}, all suites"), rows.collect()).with_remarks(remarks);
+    let mut figure = Figure::new(format!("{title}, all suites"), rows).with_remarks(remarks);
     let keys = [("survived", SURVIVED), ("did not survive", LOST)];
     figure.keys = keys
         .map(|(name, style)| Key {
@@ -121,19 +122,32 @@ const LOST: Style = Style {
     marker: Marker::Cross,
 };
 
-/// The panel of a suite, with room for `lines` methods.
-fn suite_panel(suite: &str, runs: &[Labelled<'_>], axis: &Axis, lines: usize, metric: Metric) -> Panel {
+/// Longest name beside a panel (characters); longer ones are numbered and written out below.
+const NAME_WIDTH: usize = 24;
+
+/// The panel of a suite, with room for `lines` methods; names that are too long for it go into `remarks`.
+fn suite_panel(
+    suite: &str,
+    runs: &[Labelled<'_>],
+    axis: &Axis,
+    lines: usize,
+    metric: Metric,
+    remarks: &mut Vec<String>,
+) -> Panel {
     let groups = by_method(runs);
     let height = |index: usize| (lines - index) as f64;
+    let mut notes = Vec::new();
     let names = groups
         .iter()
         .enumerate()
-        .map(|(i, g)| (height(i), g[0].full()))
+        .map(|(i, g)| (height(i), numbered(g[0].full(), NAME_WIDTH, &mut notes)))
         .collect();
     let y = Axis::linear("")
         .with_range(0.3, lines as f64 + 0.7)
         .with_names(names);
     let mut panel = Panel::new(suite, axis.clone(), y);
+    let numbers = notes.iter().enumerate();
+    remarks.extend(numbers.map(|(i, note)| format!("{suite} [{}]: {note}", i + 1)));
     for (index, group) in groups.iter().enumerate() {
         add_line(&mut panel, group, height(index), metric);
     }

@@ -1,7 +1,7 @@
 //! The table of the terminal.
 
 use super::{NONE, hard_max, number, seconds, suites, yes_no};
-use crate::figures::labels::{Labelled, by_method, labelled};
+use crate::figures::labels::{Labelled, by_method, labelled, numbered};
 use crate::records::{Metrics, Row, TerminationRecord};
 use std::fmt::Write as _;
 
@@ -57,7 +57,11 @@ pub fn terminal_table(rows: &[Row]) -> String {
         push_line(&mut text, &header);
         let mut notes = Vec::new();
         for line in terminal_lines(&of_suite) {
-            let mut line_cells = vec![line.scenario, numbered(line.method, &mut notes), line.n];
+            let mut line_cells = vec![
+                line.scenario,
+                numbered(line.method, TERMINAL[1].1, &mut notes),
+                line.n,
+            ];
             line_cells.extend(line.values);
             push_line(&mut text, &line_cells);
         }
@@ -70,18 +74,6 @@ pub fn terminal_table(rows: &[Row]) -> String {
         text.push_str(LEGEND);
     }
     text
-}
-
-/// A label that fits its column: one that does not becomes its first word and the number of a note.
-fn numbered(label: String, notes: &mut Vec<String>) -> String {
-    if label.chars().count() <= TERMINAL[1].1 {
-        return label;
-    }
-    let place = notes.iter().position(|note| *note == label).unwrap_or_else(|| {
-        notes.push(label.clone());
-        notes.len() - 1
-    });
-    format!("{} [{}]", label.split(' ').next().unwrap_or_default(), place + 1)
 }
 
 /// Who refused what, and why, each reason once.
