@@ -129,16 +129,23 @@ fn quality_of(run: &mut Row) -> &mut Quality {
     &mut run.metrics.as_mut().unwrap().quality
 }
 
-/// The published rows were recorded before the fields of today: they are read, and the README holds their table.
+fn published(folder: &str) -> Vec<Row> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../results");
+    read_rows(&root.join(folder).join(ROWS_FILE)).unwrap().rows
+}
+
 #[test]
-fn the_published_rows_give_the_table_of_the_readme() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let rows = read_rows(&root.join("results/2026-11-22-coman").join(ROWS_FILE))
-        .unwrap()
-        .rows;
-    let readme = std::fs::read_to_string(root.join("README.md")).unwrap();
+fn the_published_rows_give_the_tables_of_the_readme() {
+    let rows = published("2026-11-22-bioloid");
+    let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md");
+    let readme = std::fs::read_to_string(readme).unwrap();
     assert!(readme.contains(&readme_table(&rows)), "{}", readme_table(&rows));
-    for row in &rows {
+}
+
+/// Rows that were recorded before some fields of today are read, and their centre of mass is the worst task.
+#[test]
+fn earlier_published_rows_are_read() {
+    for row in &published("2026-11-22-coman") {
         let Some(metrics) = &row.metrics else { continue };
         assert_eq!(
             metrics.quality.worst_soft_rms_m(),
