@@ -12,6 +12,7 @@ pub mod gauss_newton;
 mod projected_cg;
 pub mod qp;
 pub mod registry;
+pub mod reverse_decoupling;
 mod sqp;
 pub mod start;
 mod step_qp;
