@@ -563,9 +563,13 @@ fn swap_quoted(text: &mut String, start: usize, other: prop::sample::Index) {
     text.replace_range(from..to, &value);
 }
 
-const TEXTS: [&str; 6] = [
+const TEXTS: [&str; 10] = [
     include_str!("../robots/coman.urdf"),
     include_str!("../robots/bioloid.urdf"),
+    include_str!("../robots/hubo.urdf"),
+    include_str!("../robots/hoap2.urdf"),
+    include_str!("../robots/hrp2.urdf"),
+    include_str!("../robots/asimo.urdf"),
     include_str!("../robots/arm6.urdf"),
     include_str!("../robots/arm7.urdf"),
     include_str!("../robots/slider-arm.urdf"),

@@ -34,6 +34,22 @@ pub const EMBEDDED: &[EmbeddedRobot] = &[
         summary: "Bioloid-type humanoid of point masses, free flyer and 18 revolute joints without limits, 1.7 kg",
     },
     EmbeddedRobot {
+        id: "hubo",
+        summary: "Hubo humanoid by its D-H table, free flyer and 24 revolute joints, legs and arms of six, 55 kg",
+    },
+    EmbeddedRobot {
+        id: "hoap2",
+        summary: "HOAP-2 humanoid by its D-H table, free flyer and 20 revolute joints, arms of four, 7 kg",
+    },
+    EmbeddedRobot {
+        id: "hrp2",
+        summary: "HRP-2 humanoid by its D-H table, free flyer and 24 revolute joints, thighs with an offset, 58 kg",
+    },
+    EmbeddedRobot {
+        id: "asimo",
+        summary: "ASIMO humanoid by its D-H table, free flyer and 24 revolute joints, tilted shoulders, 54 kg",
+    },
+    EmbeddedRobot {
         id: "arm6",
         summary: "generic arm, fixed base, 6 revolute joints, spherical wrist",
     },
@@ -53,6 +69,10 @@ pub const EMBEDDED: &[EmbeddedRobot] = &[
 
 const COMAN: &str = include_str!("../../robots/coman.urdf");
 const BIOLOID: &str = include_str!("../../robots/bioloid.urdf");
+const HUBO: &str = include_str!("../../robots/hubo.urdf");
+const HOAP2: &str = include_str!("../../robots/hoap2.urdf");
+const HRP2: &str = include_str!("../../robots/hrp2.urdf");
+const ASIMO: &str = include_str!("../../robots/asimo.urdf");
 const ARM6: &str = include_str!("../../robots/arm6.urdf");
 const ARM7: &str = include_str!("../../robots/arm7.urdf");
 const SLIDER_ARM: &str = include_str!("../../robots/slider-arm.urdf");
@@ -89,6 +109,10 @@ pub fn embedded(id: &str) -> Result<Robot, RobotError> {
         "coman-legs" => straight_knee_limit(&coman_legs()?.renamed(id)),
         "coman-legs-hyperextension" => Ok(coman_legs()?.renamed(id)),
         "bioloid" => read(BIOLOID, "robots/bioloid.urdf", Root::Floating),
+        "hubo" => read(HUBO, "robots/hubo.urdf", Root::Floating),
+        "hoap2" => read(HOAP2, "robots/hoap2.urdf", Root::Floating),
+        "hrp2" => read(HRP2, "robots/hrp2.urdf", Root::Floating),
+        "asimo" => read(ASIMO, "robots/asimo.urdf", Root::Floating),
         "arm6" => read(ARM6, "robots/arm6.urdf", Root::Fixed),
         "arm7" => read(ARM7, "robots/arm7.urdf", Root::Fixed),
         "slider-arm" => read(SLIDER_ARM, "robots/slider-arm.urdf", Root::Fixed),

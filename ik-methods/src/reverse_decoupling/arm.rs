@@ -2,8 +2,8 @@
 //! behind its elbow.
 
 use super::{
-    Inverted, LimbPose, REACH_TOLERANCE_M, STRAIGHT_TRIPLE, Solutions, Triple, Unsolved, branch_number,
-    denavit_hartenberg, hinge, sign, wrap,
+    Inverted, LimbPose, REACH_TOLERANCE_M, STRAIGHT_TRIPLE, Solutions, Triple, TripleAngles, Unsolved,
+    branch_number, denavit_hartenberg, hinge, sign, wrap,
 };
 use nalgebra::Vector3;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -56,13 +56,23 @@ const DOUBLE_WRIST: f64 = 1e-7;
 /// A shoulder this near the last axis, as part of the stretched arm, leaves θ6 free.
 const ON_WRIST_AXIS: f64 = 1e-7;
 
-/// Joints 4 to 6 of one pair of signs, and what the shoulder sees of them.
+/// Joints 4 to 6 of one pair of signs, and their shoulder.
 struct Lower {
     fourth: f64,
     fifth: f64,
     sixth: f64,
-    triple: Triple,
+    shoulder: TripleAngles,
 }
+
+impl Lower {
+    fn joints(&self, s2: f64) -> [f64; 6] {
+        let (first, second, third) = self.shoulder.branch(s2);
+        [first, second, third, self.fourth, self.fifth, self.sixth].map(wrap)
+    }
+}
+
+/// Sines above this are of distinct branches.
+const MERGING: f64 = 1e-5;
 
 impl Arm {
     /// Pose of the hand (frame 6) in the shoulder (frame 0) of joint angles (rad).
@@ -120,11 +130,29 @@ impl Arm {
         pose.check()?;
         let inverted = pose.inverted();
         let elbow = self.elbow(&inverted)?;
-        for number in 0..8 {
-            out.push(
-                self.joints(&inverted, &elbow, ArmBranch::numbered(number), previous),
-                number,
-            );
+        if elbow.sine <= STRAIGHT_ELBOW {
+            for number in 0..8 {
+                out.push(
+                    self.straight(&inverted, &elbow, ArmBranch::numbered(number), previous),
+                    number,
+                );
+            }
+            out.drop_repeated();
+            return Ok(());
+        }
+        let mut least = elbow.sine.min(elbow.wrist / self.upper_arm_m);
+        for s4 in [1.0, -1.0] {
+            for s5 in [1.0, -1.0] {
+                let lower = self.lower(&inverted, &elbow, (s4, s5), previous);
+                least = least.min(lower.shoulder.sine);
+                for s2 in [1.0, -1.0] {
+                    out.push(lower.joints(s2), branch_number(s4, s5, s2));
+                }
+            }
+        }
+        // Branches can only merge where one of their signs belongs to a zero.
+        if least < MERGING {
+            out.drop_repeated();
         }
         Ok(())
     }
@@ -180,15 +208,13 @@ impl Arm {
         if elbow.sine <= STRAIGHT_ELBOW {
             return self.straight(inverted, elbow, branch, previous);
         }
-        let lower = self.lower(inverted, elbow, branch, previous);
-        let (first, second, third) = lower.triple.angles(branch.shoulder, previous[0]);
-        [first, second, third, lower.fourth, lower.fifth, lower.sixth].map(wrap)
+        let lower = self.lower(inverted, elbow, (branch.elbow, branch.wrist), previous);
+        lower.joints(branch.shoulder)
     }
 
     /// Eqs. (26), (28) and the rotation that is left to the shoulder.
-    fn lower(&self, inverted: &Inverted, elbow: &Elbow, branch: ArmBranch, previous: &[f64; 6]) -> Lower {
+    fn lower(&self, inverted: &Inverted, elbow: &Elbow, (s4, s5): (f64, f64), previous: &[f64; 6]) -> Lower {
         let Inverted { n, s, a, .. } = inverted;
-        let (s4, s5) = (branch.elbow, branch.wrist);
         let wrist = s5 * elbow.wrist;
         let scale = 1.0 / (elbow.sine * self.upper_arm_m);
         let (fifth, sine5, cosine5) = ((s4 * elbow.z).atan2(wrist), s4 * elbow.z * scale, wrist * scale);
@@ -206,16 +232,17 @@ impl Arm {
                 + (sine4 * c6 - cosine4 * cosine5 * s6) * v.y
         };
         let third_row = sine5 * c6 * a.x - cosine5 * a.z - sine5 * s6 * a.y;
+        let shoulder = Triple {
+            sine_part: (second_row(n), second_row(s)),
+            cosine: second_row(a),
+            third: (third_row, first_row(a)),
+            first_row: (first_row(n), first_row(s)),
+        };
         Lower {
             fourth: s4 * elbow.hinge_angle,
             fifth,
             sixth,
-            triple: Triple {
-                sine_part: (second_row(n), second_row(s)),
-                cosine: second_row(a),
-                third: (third_row, first_row(a)),
-                first_row: (first_row(n), first_row(s)),
-            },
+            shoulder: shoulder.angles(previous[0]),
         }
     }
 
@@ -343,10 +370,12 @@ impl ElbowArm {
             third: (-a.z, first_row(&a)),
             first_row: (first_row(&n), first_row(&s)),
         };
+        let shoulder = triple.angles(previous[0]);
         for s2 in [1.0, -1.0] {
-            let (first, second, third) = triple.angles(s2, previous[0]);
+            let (first, second, third) = shoulder.branch(s2);
             out.push([first, second, third, fourth].map(wrap), u8::from(s2 < 0.0));
         }
+        out.drop_repeated();
         let missed = out.iter().next().map(|(q, _)| self.forward(q));
         let missed = missed.expect("two branches were written");
         let position_m = (missed.position - pose.position).amax();

@@ -1,8 +1,8 @@
 //! The leg: hip yaw, roll and pitch through one point, knee and ankle pitch parallel to hip pitch, ankle roll.
 
 use super::{
-    Inverted, LimbPose, REACH_TOLERANCE_M, Solutions, Triple, Unsolved, branch_number, denavit_hartenberg,
-    hinge, sign, wrap,
+    Hinge, Inverted, LimbPose, REACH_TOLERANCE_M, Solutions, Triple, TripleAngles, Unsolved, branch_number,
+    denavit_hartenberg, hinge, sign, wrap,
 };
 use nalgebra::Vector3;
 use std::f64::consts::FRAC_PI_2;
@@ -51,17 +51,34 @@ impl LegBranch {
 /// A hip centre this near the last axis, as part of the stretched leg, leaves θ6 free. The distance itself is compared,
 /// not its square, whose rounding would catch poses 1e-5 away.
 const ON_ANKLE_AXIS: f64 = 1e-7;
+/// Sines above this are of distinct branches.
+const MERGING: f64 = 1e-5;
 
-/// Joints 4, 5 and 6 of two branches that differ in the knee's sign, and what the hip sees of them.
+/// What the branches of one pose share: the knee, and where the hip is as the sole sees it.
+struct Shared {
+    x: f64,
+    /// Distance of the hip from the last axis.
+    across: f64,
+    /// |K|.
+    k: f64,
+    knee: Hinge,
+    /// ψ of a positive knee.
+    psi: f64,
+    /// Whether θ6 is free.
+    free: bool,
+    /// Whether θ5 is.
+    folded: bool,
+}
+
+/// Joints 4, 5 and 6 of two branches that differ in the knee's sign, and the hip of both.
 struct Lower {
     knee: f64,
-    /// ψ of a positive knee.
     psi: f64,
     /// θ5 + ψ.
     sum: f64,
     /// θ6.
     sixth: f64,
-    triple: Triple,
+    hip: TripleAngles,
 }
 
 impl Leg {
@@ -102,8 +119,9 @@ impl Leg {
         previous: &[f64; 6],
     ) -> Result<[f64; 6], Unsolved> {
         pose.check()?;
-        let lower = self.lower(&pose.inverted(), branch.ankle, previous)?;
-        Ok(lower.joints(branch.knee, branch.hip, previous))
+        let inverted = pose.inverted();
+        let lower = self.lower(&inverted, &self.shared(&inverted)?, branch.ankle, previous);
+        Ok(lower.joints(branch.knee, branch.hip))
     }
 
     /// Writes all distinct solutions; see [`Leg::solve`].
@@ -119,19 +137,20 @@ impl Leg {
         out.clear();
         pose.check()?;
         let inverted = pose.inverted();
-        let lowers = [
-            self.lower(&inverted, 1.0, previous)?,
-            self.lower(&inverted, -1.0, previous)?,
-        ];
+        let shared = self.shared(&inverted)?;
+        let lowers = [1.0, -1.0].map(|ankle| self.lower(&inverted, &shared, ankle, previous));
         for knee in [1.0, -1.0] {
             for (ankle, lower) in [1.0, -1.0].iter().zip(&lowers) {
                 for hip in [1.0, -1.0] {
-                    out.push(
-                        lower.joints(knee, hip, previous),
-                        branch_number(knee, *ankle, hip),
-                    );
+                    out.push(lower.joints(knee, hip), branch_number(knee, *ankle, hip));
                 }
             }
+        }
+        // Branches can only merge where one of their signs belongs to a zero.
+        let length = self.thigh_m + self.shank_m;
+        let least = shared.knee.sine.min(shared.k / length).min(lowers[0].hip.sine);
+        if least < MERGING {
+            out.drop_repeated();
         }
         Ok(())
     }
@@ -147,10 +166,10 @@ impl Leg {
         Ok(nearest.expect("a pose within reach has a solution"))
     }
 
-    /// Joints 4 to 6 from p', eqs. (4)-(13), and the rotation they leave to the hip.
-    fn lower(&self, inverted: &Inverted, s5: f64, previous: &[f64; 6]) -> Result<Lower, Unsolved> {
-        let Inverted { n, s, a, p } = inverted;
+    /// Eqs. (4)-(7) as far as no sign is chosen.
+    fn shared(&self, inverted: &Inverted) -> Result<Shared, Unsolved> {
         let (l3, l4, d3) = (self.thigh_m, self.shank_m, self.hip_offset_m);
+        let p = &inverted.p;
         let x = p.x + self.ankle_m;
         let across = x.hypot(p.y);
         // K² = X² + p'y² − d3²: the offset must fit beside the last axis.
@@ -163,11 +182,24 @@ impl Leg {
         }
         let k = ((across - d3.abs()).max(0.0) * (across + d3.abs())).sqrt();
         let knee = hinge(l3, l4, k.hypot(p.z)).map_err(|unsolved| with_offset(unsolved, d3))?;
-        let free = d3 == 0.0 && across < ON_ANKLE_AXIS * (l3 + l4);
-        // Equal links folded up: the hip is on the ankle's own axis, and thigh and shank turn about it together.
-        let folded = k.hypot(p.z) < ON_ANKLE_AXIS * (l3 + l4);
-        let k = s5 * k;
-        let (sixth, (s6, c6)) = if free {
+        let near = ON_ANKLE_AXIS * (l3 + l4);
+        Ok(Shared {
+            x,
+            across,
+            k,
+            psi: (knee.sine * l3).atan2(knee.cosine * l3 + l4),
+            knee,
+            free: d3 == 0.0 && across < near,
+            // Equal links folded up: the hip is on the ankle's own axis, and thigh and shank turn about it together.
+            folded: k.hypot(p.z) < near,
+        })
+    }
+
+    /// Joints 5 and 6, eqs. (12), (13), and the rotation they leave to the hip.
+    fn lower(&self, inverted: &Inverted, shared: &Shared, s5: f64, previous: &[f64; 6]) -> Lower {
+        let Inverted { n, s, a, p } = inverted;
+        let (x, across, d3, k) = (shared.x, shared.across, self.hip_offset_m, s5 * shared.k);
+        let (sixth, (s6, c6)) = if shared.free {
             (previous[5], previous[5].sin_cos())
         } else if d3 == 0.0 {
             ((s5 * p.y).atan2(-s5 * x), (s5 * p.y / across, -s5 * x / across))
@@ -176,26 +208,25 @@ impl Leg {
             let scale = 1.0 / sine.hypot(cosine);
             (sine.atan2(cosine), (sine * scale, cosine * scale))
         };
-        let psi = (knee.sine * l3).atan2(knee.cosine * l3 + l4);
-        let sum = if folded {
-            previous[4] + psi
-        } else {
-            (-p.z).atan2(k)
-        };
         let turned = |v: &Vector3<f64>| (s6 * v.x + c6 * v.y, c6 * v.x - s6 * v.y);
         let ((vx, g11), (vy, g12), (c2, cosine)) = (turned(n), turned(s), turned(a));
-        Ok(Lower {
-            knee: knee.angle,
-            psi,
-            sum,
-            sixth,
-            triple: Triple {
-                sine_part: (vx, vy),
-                cosine: c2,
-                third: (a.z, cosine),
-                first_row: (g11, g12),
+        let hip = Triple {
+            sine_part: (vx, vy),
+            cosine: c2,
+            third: (a.z, cosine),
+            first_row: (g11, g12),
+        };
+        Lower {
+            knee: shared.knee.angle,
+            psi: shared.psi,
+            sum: if shared.folded {
+                previous[4] + shared.psi
+            } else {
+                (-p.z).atan2(k)
             },
-        })
+            sixth,
+            hip: hip.angles(previous[0]),
+        }
     }
 }
 
@@ -216,8 +247,8 @@ fn with_offset(unsolved: Unsolved, offset: f64) -> Unsolved {
 }
 
 impl Lower {
-    fn joints(&self, knee: f64, hip: f64, previous: &[f64; 6]) -> [f64; 6] {
-        let (first, second, whole) = self.triple.angles(hip, previous[0]);
+    fn joints(&self, knee: f64, hip: f64) -> [f64; 6] {
+        let (first, second, whole) = self.hip.branch(hip);
         let fourth = knee * self.knee;
         let fifth = self.sum - knee * self.psi;
         let third = whole - fourth - fifth;

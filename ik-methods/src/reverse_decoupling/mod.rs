@@ -19,7 +19,7 @@ pub use arm::{Arm, ArmBranch, ElbowArm};
 pub use leg::{Leg, LegBranch};
 
 use nalgebra::{Matrix3, Vector3};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// Pose of frame 6 in frame 0 of a limb.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,15 +129,21 @@ impl<const JOINTS: usize> Solutions<JOINTS> {
         self.count = 0;
     }
 
-    /// Adds a solution unless it is there already.
     fn push(&mut self, joints: [f64; JOINTS], branch: u8) {
-        let known = self.joints[..self.count]
-            .iter()
-            .any(|other| distance(other, &joints) < SAME_RAD);
-        if !known {
-            self.joints[self.count] = joints;
-            self.branches[self.count] = branch;
-            self.count += 1;
+        self.joints[self.count] = joints;
+        self.branches[self.count] = branch;
+        self.count += 1;
+    }
+
+    /// Keeps the first of equal solutions.
+    fn drop_repeated(&mut self) {
+        let all = *self;
+        self.count = 0;
+        for (joints, branch) in all.iter() {
+            let mut kept = self.joints[..self.count].iter();
+            if !kept.any(|other| distance(other, joints) < SAME_RAD) {
+                self.push(*joints, branch);
+            }
         }
     }
 }
@@ -265,11 +271,11 @@ struct Triple {
 }
 
 impl Triple {
-    /// θ1, θ2, θ3 of the branch with `s2`, eqs. (14)-(16), (29)-(31); θ1 stays at `previous` where S2 = 0.
-    fn angles(&self, s2: f64, previous: f64) -> (f64, f64, f64) {
+    /// θ1, θ2, θ3 of the branch with S2 > 0, eqs. (14)-(16), (29)-(31); θ1 stays at `previous` where S2 = 0.
+    fn angles(&self, previous: f64) -> TripleAngles {
         let (vx, vy) = self.sine_part;
         let sine = vx.hypot(vy);
-        let second = (s2 * sine).atan2(self.cosine);
+        let second = sine.atan2(self.cosine);
         if sine < STRAIGHT_TRIPLE {
             let (c, s) = self.first_row;
             // C2 = 1: θ1 + θ3 is known; C2 = −1: θ1 − θ3.
@@ -278,10 +284,38 @@ impl Triple {
             } else {
                 previous - (-s).atan2(-c)
             };
-            return (previous, second, third);
+            return TripleAngles {
+                angles: (previous, second, third),
+                flip: 0.0,
+                sine,
+            };
         }
-        let first = (-s2 * vy).atan2(-s2 * vx);
-        let third = (s2 * self.third.0).atan2(s2 * self.third.1);
-        (first, second, third)
+        TripleAngles {
+            angles: ((-vy).atan2(-vx), second, self.third.0.atan2(self.third.1)),
+            flip: PI,
+            sine,
+        }
+    }
+}
+
+/// A spherical triple solved for S2 > 0.
+#[derive(Clone, Copy, Debug)]
+struct TripleAngles {
+    angles: (f64, f64, f64),
+    /// What the outer joints turn by when the middle one changes its sign; nothing at the singularity.
+    flip: f64,
+    /// |S2|.
+    sine: f64,
+}
+
+impl TripleAngles {
+    /// θ1, θ2, θ3 of the branch with `s2`: (θ1 + π, −θ2, θ3 + π) for the negative one.
+    fn branch(&self, s2: f64) -> (f64, f64, f64) {
+        let (first, second, third) = self.angles;
+        if s2 < 0.0 {
+            (first + self.flip, -second, third + self.flip)
+        } else {
+            self.angles
+        }
     }
 }
