@@ -344,3 +344,70 @@ fn standing_has_its_knee_forwards() {
         assert!(distance(&leg.solve(&leg.forward(&q), branch, &[0.0; 6]).unwrap(), &q) < 1e-12);
     }
 }
+
+/// Postures at and near every singular set, at distances from far below to far above the thresholds.
+#[test]
+fn no_threshold_costs_more_than_it_says() {
+    let near = |base: [f64; 6], joint: usize, numbers: &mut Numbers| {
+        let mut postures = Vec::new();
+        for decade in -140..0 {
+            let mut q = base;
+            q[joint] += 10f64.powf(0.1 * f64::from(decade)) * numbers.next().signum();
+            postures.push(q);
+        }
+        postures
+    };
+    let mut numbers = Numbers(5);
+    let mut worst = 0.0_f64;
+    for (name, leg) in legs() {
+        for _ in 0..40 {
+            let mut base: [f64; 6] = numbers.joints();
+            // Hip, knee, and a hip centre on the ankle's axis (K = 0): t5 with C45 l3 + C5 l4 = 0.
+            let on_axis =
+                -((base[3].cos() * leg.thigh_m + leg.shank_m).atan2(-base[3].sin() * leg.thigh_m)) + PI;
+            for (joint, value) in [(1, 0.0), (1, PI), (3, 0.0), (3, PI), (4, on_axis)] {
+                let kept = base[joint];
+                base[joint] = value;
+                for q in near(base, joint, &mut numbers) {
+                    let pose = leg.forward(&q);
+                    let mut all = Solutions::default();
+                    leg.solve_all(&pose, &q, &mut all).unwrap();
+                    for (solution, _) in all.iter() {
+                        let found = error(&leg.forward(solution), &pose);
+                        assert!(found < 2e-7, "{name} joint {joint}: {found:e} at {q:?}");
+                        worst = worst.max(found);
+                    }
+                }
+                base[joint] = kept;
+            }
+        }
+    }
+    for (name, arm) in arms() {
+        for _ in 0..40 {
+            let mut base: [f64; 6] = numbers.joints();
+            for (joint, value) in [
+                (1, 0.0),
+                (1, PI),
+                (3, 0.0),
+                (3, PI),
+                (4, FRAC_PI_2),
+                (4, -FRAC_PI_2),
+            ] {
+                let kept = base[joint];
+                base[joint] = value;
+                for q in near(base, joint, &mut numbers) {
+                    let pose = arm.forward(&q);
+                    let mut all = Solutions::default();
+                    arm.solve_all(&pose, &q, &mut all).unwrap();
+                    for (solution, _) in all.iter() {
+                        let found = error(&arm.forward(solution), &pose);
+                        assert!(found < 2e-7, "{name} joint {joint}: {found:e} at {q:?}");
+                        worst = worst.max(found);
+                    }
+                }
+                base[joint] = kept;
+            }
+        }
+    }
+    assert!(worst > 0.0);
+}

@@ -49,8 +49,8 @@ impl ArmBranch {
 }
 
 /// An elbow whose sine is below this is straight or folded. The sine of a stretched elbow is the root of what rounding
-/// leaves of the pose, some 1e-7.
-const STRAIGHT_ELBOW: f64 = 1e-6;
+/// leaves of the pose, some 1e-7; snapping it costs the sine times the upper arm.
+const STRAIGHT_ELBOW: f64 = 5e-7;
 /// A wrist whose cosine (times the sine of the elbow) is below this is at its double root: the same argument.
 const DOUBLE_WRIST: f64 = 1e-7;
 /// A shoulder this near the last axis, as part of the stretched arm, leaves θ6 free.
