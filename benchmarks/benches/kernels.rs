@@ -1,7 +1,8 @@
-//! Group `kernels`: what a control step is made of, each alone, on the robot and the task rows of the Coman suites.
+//! Group `kernels`: what a control step is made of, each alone, on the robot and the task rows of the Coman suites. Group
+//! `closed_form`: a batch of poses of one limb on one thread and on all.
 
 use benchmarks::suite::{Case, Suite, Variation};
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use ik_core::evaluator::{Evaluator, Linearisation};
 use ik_core::kinematics::gravity::static_torques_into;
 use ik_core::kinematics::jacobian::{Axes, frame_jacobian_into};
@@ -9,7 +10,10 @@ use ik_core::kinematics::{Page, forward};
 use ik_core::problem::PhaseId;
 use ik_core::robot::{Robot, embedded};
 use ik_methods::qp::{ActiveSet, MatRef, Qp, QpSolution, QpSolver, QpStatus};
+use ik_methods::reverse_decoupling::{Leg, LegBranch};
 use nalgebra::Matrix6xX;
+use rayon::ThreadPoolBuilder;
+use rayon::prelude::*;
 use std::hint::black_box;
 
 /// Half the width of the box of the quadratic program (rad): 4 rad/s for 5 ms.
@@ -121,5 +125,40 @@ fn qp(c: &mut Criterion) {
         });
 }
 
-criterion_group!(kernels, kinematics, rows, qp);
+/// A million poses of a leg, one branch each, on one thread and on all.
+fn closed_form_batch(c: &mut Criterion) {
+    const POSES: usize = 1_000_000;
+    let leg = Leg {
+        thigh_m: 0.30003,
+        shank_m: 0.30038,
+        ankle_m: 0.09497,
+        hip_offset_m: 0.0,
+    };
+    let posture =
+        |i: usize| std::array::from_fn(|j| ((6 * i + j) as f64 * 0.618_033_988_749_895).fract() * 3.0 - 1.5);
+    let poses: Vec<_> = (0..POSES).map(|i| leg.forward(&posture(i))).collect();
+    let mut joints = vec![[0.0; 6]; POSES];
+    let mut group = c.benchmark_group("closed_form");
+    group
+        .throughput(Throughput::Elements(POSES as u64))
+        .sample_size(10);
+    for threads in [1, std::thread::available_parallelism().map_or(1, usize::from)] {
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.expect("threads can be started");
+        group.bench_function(format!("hubo leg, a million poses, {threads} threads"), |b| {
+            b.iter(|| {
+                pool.install(|| {
+                    joints.par_iter_mut().zip(&poses).for_each(|(q, pose)| {
+                        *q = leg
+                            .solve(pose, LegBranch::numbered(0), &[0.0; 6])
+                            .expect("made from joints");
+                    });
+                });
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(kernels, kinematics, rows, qp, closed_form_batch);
 criterion_main!(kernels);
