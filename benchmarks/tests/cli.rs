@@ -260,6 +260,35 @@ fn lists_name_what_there_is() {
 }
 
 #[test]
+fn methods_are_explained() {
+    let folder = Folder::new("explain");
+    let svg = folder.path("graph.svg");
+    let davies = folder.succeed(&["explain", "davies", "--robot", "bioloid", "--svg", &svg]);
+    for words in [
+        "links     45",
+        "N         24 x 48, rank 24; mobility 24",
+        "Ns        24 x 24, rank 24",
+        "6 imposed, 0 compromised, on 6 joints: left-foot",
+    ] {
+        assert!(davies.contains(words), "{words} is missing in:\n{davies}");
+    }
+    assert!(fs::read_to_string(svg).unwrap().contains("circuit 4"));
+    let limbs = folder.succeed(&["explain", "reverse-decoupling", "--robot", "hrp2"]);
+    assert_eq!(
+        limbs.matches("closed form: leg of the paper").count(),
+        2,
+        "{limbs}"
+    );
+    assert_eq!(limbs.matches("theta = q +90.000 deg").count(), 2, "{limbs}");
+    folder.refuse(&["explain", "ik4", "--robot", "bioloid"], &["ik4", "davies"]);
+    folder.refuse(&["explain", "davies", "--robot", "arm7"], &["arm7", "bioloid"]);
+    folder.refuse(
+        &["explain", "reverse-decoupling", "--robot", "hubbo"],
+        &["hubbo", "did you mean `hubo`"],
+    );
+}
+
+#[test]
 fn without_a_folder_a_run_shows_its_table_and_writes_nothing() {
     let folder = Folder::new("table");
     let suite = folder.write("short.toml", &short_squat());

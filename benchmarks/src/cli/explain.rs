@@ -7,20 +7,30 @@ use crate::records_io::write_atomically;
 use crate::suite::{Case, RobotSpec, Suite, Variation, known_method};
 use ik_core::driver::Driver;
 use ik_core::problem::PhaseId;
+use ik_core::robot::{EMBEDDED, embedded};
 use ik_methods::davies::{
     LinkKind, Mechanism, MechanismBlock, Network, OrientationRates, ReferencePoint, Role,
 };
+use ik_methods::reverse_decoupling::analyser::{denavit_hartenberg, limbs};
 use std::io::{self, Write};
+use std::sync::Arc;
 
 /// Methods that can be explained.
 const EXPLAINED: [&str; 2] = ["davies", "davies-open"];
 /// Width of a line on a terminal.
 const WIDTH: usize = 100;
 
+/// What stands for the closed forms, which are not registered.
+const CLOSED_FORM: &str = "reverse-decoupling";
+
 pub(super) fn explain(args: &ExplainArgs, out: &mut dyn Write) -> Result<(), Failure> {
+    if args.method == CLOSED_FORM {
+        return closed_forms(args, out);
+    }
     let entry = known_method(&args.method, "explain")?;
     if !EXPLAINED.contains(&entry.info().id) {
-        return Err(InputError::value("explain", "method", &args.method, "davies or davies-open").into());
+        let allowed = "davies, davies-open or reverse-decoupling";
+        return Err(InputError::value("explain", "method", &args.method, allowed).into());
     }
     let suite = match (&args.suite, &args.robot) {
         (Some(name), _) => Suite::load(name)?,
@@ -63,6 +73,56 @@ pub(super) fn explain(args: &ExplainArgs, out: &mut dyn Write) -> Result<(), Fai
         Err(declined) => writeln!(out, "declined: {declined}")?,
     }
     Ok(())
+}
+
+/// Which limbs of a robot have a closed form, and why the others have none.
+fn closed_forms(args: &ExplainArgs, out: &mut dyn Write) -> Result<(), Failure> {
+    let robot = match (&args.suite, &args.robot) {
+        (Some(name), _) => {
+            let suite = Suite::load(name)?;
+            Case::new(&suite, 0, &Variation::default())?
+                .problem
+                .robot_arc()
+                .clone()
+        }
+        (None, Some(id)) => {
+            let known = EMBEDDED.iter().map(|robot| robot.id);
+            let robot =
+                embedded(id).map_err(|_| InputError::unknown("explain: --robot", "robot", id, known))?;
+            Arc::new(robot)
+        }
+        (None, None) => unreachable!("one of them is required"),
+    };
+    writeln!(out, "limbs of {}", robot.name())?;
+    for limb in limbs(&robot) {
+        let (joints, count) = (limb.joint_names.join(" "), limb.joint_names.len());
+        writeln!(
+            out,
+            "  {} -> {}, {count} joints: {joints}",
+            limb.base_name, limb.tip_name
+        )?;
+        writeln!(out, "      {}", limb.verdict)?;
+        if let Ok(table) = denavit_hartenberg(&robot, &limb) {
+            for (i, row) in table.rows.iter().enumerate() {
+                writeln!(
+                    out,
+                    "      {}  alpha {:8.3} deg  a {:9.6} m  d {:9.6} m  theta = {}q {:+.3} deg",
+                    i + 1,
+                    rounded(row.alpha.to_degrees()),
+                    rounded(row.a),
+                    rounded(row.d),
+                    if row.sign < 0.0 { "-" } else { "" },
+                    rounded(row.offset.to_degrees())
+                )?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Without the sign of a zero and what rounding leaves beside it.
+fn rounded(value: f64) -> f64 {
+    (value * 1e9).round() / 1e9 + 0.0
 }
 
 /// The first embedded suite on a robot.

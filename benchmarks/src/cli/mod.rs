@@ -66,7 +66,7 @@ enum Command {
     },
     /// Run suites and print their table
     Run(RunArgs),
-    /// Show how a method sees a problem: the graph and the network matrix of davies
+    /// Show how a method sees a problem: the graph and the network matrix of davies, the limbs with a closed form
     Explain(ExplainArgs),
     /// Solve the control step in a file and print the answer as JSON
     Solve(SolveArgs),
@@ -155,9 +155,9 @@ struct SolveArgs {
 
 #[derive(Debug, Args)]
 struct ExplainArgs {
-    /// Method
+    /// davies, davies-open or reverse-decoupling
     method: String,
-    /// Embedded robot: the first suite that has it gives the problem
+    /// Embedded robot; for davies the first suite that has it gives the problem
     #[arg(
         long,
         value_name = "ROBOT",

@@ -12,6 +12,7 @@
 //! Deviation: forms that keep their precision at the ends of the range are used throughout: no arc cosine, both arguments
 //! of an arc tangent multiplied by the branch sign instead of adding π, clamped roots, one wrap at the end.
 
+pub mod analyser;
 mod arm;
 mod leg;
 
