@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used, clippy::float_cmp, missing_docs, reason = "tests")]
 
+use ik_methods::reverse_decoupling::general::{self, DhRow, GeneralLimb};
 use ik_methods::reverse_decoupling::{
     Arm, ArmBranch, ElbowArm, Leg, LegBranch, LimbPose, Solutions, Unsolved, distance,
 };
@@ -165,6 +166,69 @@ fn the_arm_of_four_joints_has_two_solutions_and_refuses_other_poses() {
         let refused = arm.solve_all(&off, &[0.0; 4], &mut all);
         assert!(matches!(refused, Err(Unsolved::OffSet { .. })), "{refused:?}");
         assert!(all.is_empty());
+    }
+}
+
+/// The solver of any such limb and the forms of the paper: the same postures, neither more nor fewer.
+#[test]
+fn the_general_solver_finds_the_same_solutions() {
+    let general = |rows: [(f64, f64, f64); 6]| {
+        GeneralLimb::new(rows.map(|(d, a, alpha)| DhRow { alpha, a, d })).unwrap()
+    };
+    let h = FRAC_PI_2;
+    let same = |name: &str, closed: &Solutions<6>, pose: &LimbPose, limb: &GeneralLimb| {
+        let mut others = general::Solutions::default();
+        limb.solve_into(&pose.rotation, &pose.position, &[0.0; 6], &mut others);
+        assert_eq!(closed.len(), others.as_slice().len(), "{name}");
+        for (solution, _) in closed.iter() {
+            let among = others
+                .as_slice()
+                .iter()
+                .any(|other| distance(other, solution) < 1e-6);
+            assert!(among, "{name}: {solution:?}");
+        }
+    };
+    let mut numbers = Numbers(6);
+    for _ in 0..2000 {
+        let q: [f64; 6] = numbers.joints();
+        if [q[1].sin(), q[3].sin(), q[4].cos()]
+            .iter()
+            .any(|s| s.abs() < 10.0 * REGULAR)
+        {
+            continue;
+        }
+        for (name, leg) in legs() {
+            let k = (q[3] + q[4]).cos() * leg.thigh_m + q[4].cos() * leg.shank_m;
+            if k.abs() < 10.0 * REGULAR * leg.thigh_m {
+                continue;
+            }
+            let (l3, l4, l5, d3) = (leg.thigh_m, leg.shank_m, leg.ankle_m, leg.hip_offset_m);
+            let rows = [
+                (0.0, 0.0, h),
+                (0.0, 0.0, -h),
+                (d3, l3, 0.0),
+                (0.0, l4, 0.0),
+                (0.0, 0.0, h),
+                (0.0, l5, 0.0),
+            ];
+            let (pose, mut all) = (leg.forward(&q), Solutions::default());
+            leg.solve_all(&pose, &[0.0; 6], &mut all).unwrap();
+            same(name, &all, &pose, &general(rows));
+        }
+        for (name, arm) in arms() {
+            let (l2, l3, l4) = (arm.upper_arm_m, arm.forearm_m, arm.hand_m);
+            let rows = [
+                (0.0, 0.0, h),
+                (0.0, 0.0, -h),
+                (-l2, 0.0, h),
+                (0.0, 0.0, h),
+                (l3, 0.0, h),
+                (0.0, l4, 0.0),
+            ];
+            let (pose, mut all) = (arm.forward(&q), Solutions::default());
+            arm.solve_all(&pose, &[0.0; 6], &mut all).unwrap();
+            same(name, &all, &pose, &general(rows));
+        }
     }
 }
 

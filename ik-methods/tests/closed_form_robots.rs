@@ -1,13 +1,17 @@
-//! The closed forms on the embedded humanoids: their limbs, from the poses the robots' own kinematics give.
+//! The closed forms on robots: every limb the analyser names is solved from the poses the robot's own kinematics give, on the
+//! embedded robots and, where they are installed, on the reference robots.
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use ik_core::kinematics::{Page, forward};
-use ik_core::robot::{Robot, embedded};
-use ik_methods::reverse_decoupling::{Arm, ElbowArm, Leg, LimbPose, Solutions, distance};
-use std::f64::consts::{FRAC_PI_2, PI};
+use ik_core::robot::{EMBEDDED, Robot, Root, UrdfOptions, embedded};
+use ik_methods::reverse_decoupling::Limb;
+use ik_methods::reverse_decoupling::analyser::{LimbReport, Verdict, limbs};
+use nalgebra::Isometry3;
+use std::f64::consts::PI;
+use std::path::Path;
 
-const POSES: usize = 2000;
+const POSES: usize = 500;
 
 /// Multiples of the golden ratio in ±π: they do not repeat.
 fn angle(i: usize) -> f64 {
@@ -16,95 +20,101 @@ fn angle(i: usize) -> f64 {
 
 fn posture(robot: &Robot, k: usize) -> Vec<f64> {
     let mut q = robot.neutral();
-    q[7..]
-        .iter_mut()
-        .enumerate()
-        .for_each(|(i, q)| *q = angle(97 * k + i));
+    let joints = q[robot.root().nq()..].iter_mut().enumerate();
+    joints.for_each(|(i, q)| *q = angle(97 * k + i));
     q
 }
 
-/// The joints of a limb in `q`, and the pose of its end in the frame of its first joint.
-fn limb<const N: usize>(
-    robot: &Robot,
-    page: &Page,
-    q: &[f64],
-    limb: &str,
-    end: &str,
-) -> ([f64; N], LimbPose) {
-    let index = |i: usize| robot.coordinate(&format!("{limb}_{}", i + 1)).unwrap();
-    let first = robot
-        .joints()
-        .iter()
-        .find(|j| j.name == format!("{limb}_1"))
-        .unwrap();
-    let base = page.frame_pose(robot, robot.frame("waist").unwrap()) * first.x_parent_joint;
-    let in_base = base.inverse() * page.frame_pose(robot, robot.frame(end).unwrap());
-    let pose = LimbPose {
-        rotation: in_base.rotation.to_rotation_matrix().into_inner(),
-        position: in_base.translation.vector,
-    };
-    (std::array::from_fn(|i| q[7 + index(i)]), pose)
+/// Pose of a body in the world, by a frame fixed in it.
+fn body(robot: &Robot, page: &Page, body: usize) -> Isometry3<f64> {
+    let frames = robot.frames().iter().enumerate();
+    let (id, frame) = frames.into_iter().find(|(_, frame)| frame.body == body).unwrap();
+    page.frame_pose(robot, ik_core::robot::FrameId(id)) * frame.x_body_frame.inverse()
 }
 
-fn among<const N: usize>(all: &Solutions<N>, q: &[f64; N]) -> bool {
-    all.iter().any(|(solution, _)| distance(solution, q) < 1e-6)
+fn away(a: &[f64], b: &[f64]) -> f64 {
+    let wrapped = |d: f64| (d - 2.0 * PI * (d / (2.0 * PI)).round()).abs();
+    a.iter().zip(b).map(|(a, b)| wrapped(a - b)).fold(0.0, f64::max)
 }
 
-/// Robot; leg lengths l3, l4, l5, d3 of the right leg; arm lengths l2, l3, l4; θ5 − q5 of the arm.
-const ROBOTS: [(&str, [f64; 4], [f64; 3], f64); 4] = [
-    (
-        "hubo",
-        [0.30003, 0.30038, 0.09497, 0.0],
-        [0.17914, 0.18159, 0.12065],
-        0.0,
-    ),
-    ("hoap2", [0.1, 0.1, 0.037, 0.0], [0.101, 0.1, 0.033], 0.0),
-    ("hrp2", [0.3, 0.3, 0.105, 0.035], [0.25, 0.25, 0.15], FRAC_PI_2),
-    ("asimo", [0.28, 0.3, 0.09, 0.0], [0.24, 0.22, 0.12], 0.0),
-];
+/// Solves a limb at many postures: how often the generating joints are among the solutions, and the worst error of a pose.
+fn solved(robot: &Robot, report: &LimbReport) -> (usize, f64) {
+    let limb = Limb::new(robot, report).unwrap();
+    let mut page = Page::new(robot);
+    let coordinate = |joint: &usize| robot.root().nq() + robot.joints()[*joint].coordinate;
+    let (mut found, mut worst) = (0, 0.0_f64);
+    for k in 0..POSES {
+        let mut q = posture(robot, k);
+        forward(robot, &q, &mut page);
+        let pose = body(robot, &page, report.base).inverse() * body(robot, &page, report.tip);
+        let joints: Vec<f64> = report.joints.iter().map(|j| q[coordinate(j)]).collect();
+        let mut solutions: Vec<Vec<f64>> = Vec::new();
+        let count = limb
+            .for_each_solution(&pose, &joints, |solution, _| solutions.push(solution.to_vec()))
+            .unwrap();
+        assert_eq!(count, solutions.len());
+        found += usize::from(solutions.iter().any(|s| away(s, &joints) < 1e-6));
+        let mut nearest = vec![0.0; limb.joints()];
+        limb.solve_nearest(&pose, &joints, &mut nearest).unwrap();
+        assert!(
+            solutions
+                .iter()
+                .all(|s| away(s, &joints) >= away(&nearest, &joints))
+        );
+        for solution in &solutions {
+            for (joint, value) in report.joints.iter().zip(solution) {
+                q[coordinate(joint)] = *value;
+            }
+            forward(robot, &q, &mut page);
+            let reached = body(robot, &page, report.base).inverse() * body(robot, &page, report.tip);
+            let off = pose.inverse() * reached;
+            worst = worst.max(off.translation.vector.norm()).max(off.rotation.angle());
+        }
+    }
+    (found, worst)
+}
+
+fn check(robot: &Robot) -> usize {
+    let closed = limbs(robot)
+        .into_iter()
+        .filter(|limb| matches!(limb.verdict, Verdict::ClosedForm(_)));
+    let mut count = 0;
+    for report in closed {
+        let (found, worst) = solved(robot, &report);
+        let name = format!("{} {} ({})", robot.name(), report.tip_name, report.verdict);
+        // Joints are only determined to 1e-6 away from singular postures.
+        assert!(found >= POSES - POSES / 100, "{name}: {found} of {POSES}");
+        assert!(worst < 1e-8, "{name}: {worst:e}");
+        count += 1;
+    }
+    count
+}
 
 #[test]
-fn every_limb_of_every_robot_is_solved() {
-    for (id, leg, arm, offset) in ROBOTS {
-        let robot = embedded(id).unwrap();
-        let mut page = Page::new(&robot);
-        let (mut found, mut asked) = (0, 0);
-        for k in 0..POSES {
-            let q = posture(&robot, k);
-            forward(&robot, &q, &mut page);
-            for (side, sign) in [("r", 1.0), ("l", -1.0)] {
-                let leg = Leg {
-                    thigh_m: leg[0],
-                    shank_m: leg[1],
-                    ankle_m: leg[2],
-                    hip_offset_m: sign * leg[3],
-                };
-                let (joints, pose) =
-                    limb::<6>(&robot, &page, &q, &format!("{side}_leg"), &format!("{side}_foot"));
-                let mut all = Solutions::default();
-                leg.solve_all(&pose, &joints, &mut all).unwrap();
-                found += usize::from(among(&all, &joints));
-                let arm = Arm {
-                    upper_arm_m: arm[0],
-                    forearm_m: arm[1],
-                    hand_m: arm[2],
-                };
-                let (limb_name, end) = (format!("{side}_arm"), format!("{side}_hand"));
-                if id == "hoap2" {
-                    let (joints, pose) = limb::<4>(&robot, &page, &q, &limb_name, &end);
-                    let mut both = Solutions::default();
-                    ElbowArm { arm }.solve_all(&pose, &joints, &mut both).unwrap();
-                    found += usize::from(among(&both, &joints));
-                } else {
-                    let (mut joints, pose) = limb::<6>(&robot, &page, &q, &limb_name, &end);
-                    joints[4] += offset;
-                    arm.solve_all(&pose, &joints, &mut all).unwrap();
-                    found += usize::from(among(&all, &joints));
-                }
-                asked += 2;
-            }
-        }
-        // Joints are only determined to 1e-6 away from singular postures.
-        assert!(found >= asked - asked / 200, "{id}: {found} of {asked}");
+fn every_limb_of_every_embedded_robot_is_solved() {
+    let count: usize = EMBEDDED
+        .iter()
+        .map(|robot| check(&embedded(robot.id).unwrap()))
+        .sum();
+    // Two legs each of COMAN (three models), Bioloid and the four humanoids, two arms each of these, one arm of six joints.
+    assert_eq!(count, 2 * 3 + 2 + 4 * 4 + 1);
+}
+
+#[test]
+fn the_limbs_of_the_reference_robots_are_solved() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/robots");
+    if !folder.is_dir() {
+        eprintln!(
+            "skipped: the reference robots are not installed ({})",
+            folder.display()
+        );
+        return;
     }
+    let mut count = 0;
+    for id in ["coman", "icub", "hubo2", "drchubo", "hrp4c", "hoap2"] {
+        let file = folder.join(id).join(format!("{id}.urdf"));
+        let options = UrdfOptions { root: Root::Floating };
+        count += check(&Robot::from_urdf_file(&file, &options).unwrap());
+    }
+    assert_eq!(count, 12);
 }

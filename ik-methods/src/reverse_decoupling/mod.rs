@@ -14,10 +14,14 @@
 
 pub mod analyser;
 mod arm;
+pub mod general;
 mod leg;
+mod limb;
+pub mod quartic;
 
 pub use arm::{Arm, ArmBranch, ElbowArm};
 pub use leg::{Leg, LegBranch};
+pub use limb::{Limb, Unbound};
 
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::{PI, TAU};
@@ -71,6 +75,12 @@ pub enum Unsolved {
         found_m: f64,
         /// Largest possible (m).
         largest_m: f64,
+    },
+    /// A limb of the general family has no solution.
+    #[error("out of reach{}", .excess_m.map_or(String::new(), |excess| format!(" by {excess} m")))]
+    General {
+        /// By how much (m), where an equation tells.
+        excess_m: Option<f64>,
     },
     /// An arm of four joints cannot take this pose: its poses are a four-dimensional set.
     #[error("an arm of four joints misses this pose by {position_m} m and {rotation_rad} rad")]
