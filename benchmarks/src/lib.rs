@@ -8,6 +8,7 @@ pub mod cli;
 pub mod error;
 pub mod figures;
 pub mod instance;
+pub mod limb_pose;
 pub mod machine;
 pub mod records;
 pub mod records_io;

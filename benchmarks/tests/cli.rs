@@ -289,6 +289,50 @@ fn methods_are_explained() {
 }
 
 #[test]
+fn a_limb_takes_a_pose_in_all_its_postures() {
+    let folder = Folder::new("limb");
+    let file = |frame: &str, z: f64, extra: &str| {
+        format!(
+            "{{\"schema\": \"ik-bench/limb-pose/1\", \"robot\": {{\"embedded\": \"hubo\"}}, \"frame\": \"{frame}\", \
+             \"position_m\": [0.05, -0.1, {z}], \"rotation_xyzw\": [0.0, 0.0, 0.0, 1.0]{extra}}}"
+        )
+    };
+    let bent = ", \"previous\": {\"r_leg_4\": 1.0}";
+    let solve = |text: &str, options: &[&str]| -> serde_json::Value {
+        let path = folder.write("pose.json", text);
+        let arguments = [&["solve", &path][..], options].concat();
+        serde_json::from_str(&folder.succeed(&arguments)).unwrap()
+    };
+    let all = solve(&file("r_sole", -0.7, bent), &["--all-solutions"]);
+    let solutions = all["solutions"].as_array().unwrap();
+    assert_eq!((all["outcome"].as_str(), solutions.len()), (Some("solved"), 8));
+    for solution in solutions {
+        assert!(solution["error_m"].as_f64().unwrap() < 1e-12);
+        let knee = solution["joints"]["r_leg_4"].as_f64().unwrap();
+        assert_eq!(solution["indicators"]["knee"].as_i64().unwrap() < 0, knee < 0.0);
+    }
+    let one = solve(&file("r_sole", -0.7, bent), &[]);
+    assert_eq!(one["solutions"].as_array().unwrap().len(), 1);
+    assert_eq!(one["solutions"][0], solutions[0]);
+    let far = solve(&file("r_sole", -1.7, ""), &["--all-solutions"]);
+    assert!(
+        far["outcome"].as_str().unwrap().starts_with("out of reach"),
+        "{far}"
+    );
+    assert!(far["solutions"].as_array().unwrap().is_empty());
+    let path = folder.write("bad.json", &file("waist", -0.7, ""));
+    folder.refuse(&["solve", &path], &["frame", "waist", "r_sole"]);
+    let path = folder.write(
+        "bad.json",
+        &file("r_sole", -0.7, ", \"previous\": {\"l_leg_4\": 1.0}"),
+    );
+    folder.refuse(&["solve", &path], &["previous", "l_leg_4", "r_leg_4"]);
+    let skewed = file("r_sole", -0.7, "").replace("[0.0, 0.0, 0.0, 1.0]", "[0.0, 0.3, 0.0, 1.0]");
+    let path = folder.write("bad.json", &skewed);
+    folder.refuse(&["solve", &path], &["rotation_xyzw", "unit quaternion"]);
+}
+
+#[test]
 fn without_a_folder_a_run_shows_its_table_and_writes_nothing() {
     let folder = Folder::new("table");
     let suite = folder.write("short.toml", &short_squat());

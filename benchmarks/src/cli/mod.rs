@@ -68,7 +68,7 @@ enum Command {
     Run(RunArgs),
     /// Show how a method sees a problem: the graph and the network matrix of davies, the limbs with a closed form
     Explain(ExplainArgs),
-    /// Solve the control step in a file and print the answer as JSON
+    /// Solve the control step or the limb's pose in a file and print the answer as JSON
     Solve(SolveArgs),
     /// Draw the figures of a results folder
     Figures {
@@ -143,7 +143,7 @@ impl RunArgs {
 
 #[derive(Debug, Args)]
 struct SolveArgs {
-    /// Instance (JSON), as `run --dump-step` writes it
+    /// Instance (JSON), as `run --dump-step` writes it, or the pose of a limb (JSON) for its closed form
     instance: PathBuf,
     /// Method to use instead of the instance's
     #[arg(long, value_name = "METHOD")]
@@ -151,6 +151,9 @@ struct SolveArgs {
     /// Parameter of the method; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// All solutions of a limb's pose, not the nearest alone
+    #[arg(long, conflicts_with_all = ["method", "set"])]
+    all_solutions: bool,
 }
 
 #[derive(Debug, Args)]

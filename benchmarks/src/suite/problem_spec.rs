@@ -140,7 +140,11 @@ impl RobotSpec {
         })
     }
 
-    fn build(&self, place: &str) -> Result<Robot, InputError> {
+    /// Builds the robot; `place` goes into messages.
+    ///
+    /// # Errors
+    /// An unknown id, a file that cannot be read or is no robot.
+    pub(crate) fn build(&self, place: &str) -> Result<Robot, InputError> {
         let robot = match self {
             Self::Embedded(id) => embedded(id),
             Self::UrdfFile { path, root } => Robot::from_urdf_file(path, &UrdfOptions { root: *root }),
