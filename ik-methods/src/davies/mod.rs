@@ -51,6 +51,7 @@ mod circuits;
 mod least_norm;
 mod mechanism;
 mod network;
+mod rows;
 mod virtual_chain;
 
 pub use mechanism::{
