@@ -31,6 +31,7 @@ pub(crate) fn legs(boundary: Boundary, com_weights: Vec<f64>) -> Arc<Problem> {
             .collect(),
         phases: vec![Phase {
             name: "all".into(),
+            support: None,
             tasks: tasks
                 .iter()
                 .enumerate()
