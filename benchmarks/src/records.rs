@@ -141,6 +141,42 @@ pub struct Quality {
     /// (m). None also as before.
     #[serde(default)]
     pub zmp_gcom_distance_rms_m: Option<f64>,
+    /// Per secondary objective of the problem, by its kind: mean of its value over the samples in which one foot carries, over
+    /// k ≥ 0 in runs without such samples.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub objective_mean: BTreeMap<String, f64>,
+    /// Mean of the sum of squared static joint torques over the samples in which one foot carries (N²m²), the robot hanging
+    /// from the support of the phase. None, and the next two empty, where the problem names no supports or both feet always
+    /// carry.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub single_support_torque_squared_mean_n2m2: Option<f64>,
+    /// RMS of each joint's torque over the same samples (Nm), by joint.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub single_support_torque_rms_nm: BTreeMap<String, f64>,
+    /// Largest size of each joint's torque over them (Nm), by joint.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub single_support_torque_peak_nm: BTreeMap<String, f64>,
+    /// Mean over the cycles of two steps of the largest change of a joint from one cycle to the next (rad), the first and the
+    /// closing step left out. None, as the next, where a walk has fewer than two such cycles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_drift_mean_rad_per_cycle: Option<f64>,
+    /// The same over the last cycle alone (rad).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_drift_last_rad_per_cycle: Option<f64>,
+    /// RMS of the distance between the zero-moment point of the cart and its reference, later than 0.2 s and without the first
+    /// and the last two samples (m). None, as the next three, where nothing walks by preview control or the suite names no
+    /// soles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zmp_reference_error_rms_m: Option<f64>,
+    /// Its largest value (m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zmp_reference_error_max_m: Option<f64>,
+    /// `zmp_margin_min_m` over the same samples (m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub settled_zmp_margin_min_m: Option<f64>,
+    /// `cart_zmp_margin_min_m` over the same samples (m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub settled_cart_zmp_margin_min_m: Option<f64>,
     /// All finite, limit violation ≤ 1e-6 rad, boundary value ≤ 1e-4 (a polygon: excess ≤ 1e-6 rad
     /// instead, a box: no speed limit passed), hard errors
     /// < 1e-3, `soft_error_max_m` below the tolerance of the suite. Balance does not count.

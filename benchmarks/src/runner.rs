@@ -15,7 +15,6 @@ use crate::referee::{Run, StepEfforts};
 use crate::suite::Case;
 use ik_core::driver::Driver;
 use ik_core::formulation::Termination;
-use ik_core::problem::PhaseId;
 use ik_methods::registry::{Contestant, method};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -25,8 +24,6 @@ use walk::{Timed, time, walk};
 
 /// The method that step times are compared with.
 pub const REFERENCE: &str = "ik1";
-/// The only phase of a suite's problem.
-const WHOLE: PhaseId = PhaseId(0);
 
 /// How often a motion is replayed for its step times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -233,8 +230,9 @@ fn judged_run<'a>(case: &'a Case, played: &'a Played) -> Run<'a> {
         dt_s: case.dt_s,
         q: &played.q,
         targets: case.samples.judged(),
-        phases: &[WHOLE],
+        phases: &case.phases,
         support: &case.support,
+        walk: case.walk.as_ref(),
     }
 }
 

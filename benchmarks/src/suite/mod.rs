@@ -4,6 +4,7 @@ mod case;
 mod closure;
 mod lineup;
 mod problem_spec;
+mod reach;
 
 pub use case::{Case, Variation};
 pub use lineup::{Selection, lineup};
@@ -12,7 +13,7 @@ pub use problem_spec::{LimitsSpec, PrioritySpec, ProblemSpec, RobotSpec, TaskSpe
 
 use crate::error::InputError;
 use crate::referee::Foot;
-use crate::trajectory::{GaitSpec, MotionSpec};
+use crate::trajectory::{GaitSpec, MotionSpec, WalkSpec};
 use ik_core::boundary::Boundary;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -115,12 +116,29 @@ pub struct ScenarioSpec {
     /// A walk: the targets of its tasks, in place of their values at the start.
     #[serde(default)]
     pub gait: Option<GaitSpec>,
+    /// A walk by preview control, likewise.
+    #[serde(default)]
+    pub walk: Option<WalkSpec>,
+    /// Gains of the problem's objectives, one each in their order.
+    #[serde(default)]
+    pub gains: Vec<GainSpec>,
     /// The terms that move the targets; tasks without one keep their value at the start.
     #[serde(default)]
     pub motion: Vec<MotionSpec>,
     /// Boundary in place of the problem's.
     #[serde(default)]
     pub boundary: Option<Boundary>,
+}
+
+/// The gain γ of a secondary objective: how fast the joints go down its gradient, `q̇₀ = −γ ∇H`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GainSpec {
+    /// Its full value (rad²/s per unit of the objective).
+    pub value: f64,
+    /// Zero in double support, rising from lift-off and falling to touchdown in this time (s); without it the gain is constant.
+    #[serde(default)]
+    pub single_support_ramp_s: Option<f64>,
 }
 
 /// A competing method, or several: lists in `set` are multiplied out.
@@ -155,6 +173,14 @@ pub const EMBEDDED: &[(&str, &str)] = &[
         include_str!("../../suites/bioloid/com-sway.toml"),
     ),
     ("bioloid/squat", include_str!("../../suites/bioloid/squat.toml")),
+    ("melson/walk", include_str!("../../suites/melson/walk.toml")),
+    (
+        "melson/long-walk",
+        include_str!("../../suites/melson/long-walk.toml"),
+    ),
+    ("walk/hubo", include_str!("../../suites/walk/hubo.toml")),
+    ("walk/bioloid", include_str!("../../suites/walk/bioloid.toml")),
+    ("walk/coman", include_str!("../../suites/walk/coman.toml")),
 ];
 
 impl Suite {

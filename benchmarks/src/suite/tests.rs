@@ -431,6 +431,7 @@ fn soles_turn_balance_on_and_are_checked() {
         targets: case.samples.judged(),
         phases: &[ik_core::problem::PhaseId(0)],
         support: &[],
+        walk: None,
     };
     let margin = case.referee.judge(&start).gcom_margin_min_m.unwrap();
     assert!(margin > 0.0 && margin <= 0.1, "{margin}");
