@@ -48,7 +48,6 @@
 //! monitored coordinates too, which are no effort.
 
 mod circuits;
-mod least_norm;
 mod mechanism;
 mod network;
 mod rows;
@@ -59,6 +58,7 @@ pub use mechanism::{
 };
 pub use network::{Network, ReferencePoint};
 
+use crate::generic_posture::generic_postures;
 use crate::registry::{Allowed, Field, Method, MethodInfo, Parameters, Preset};
 use crate::step_qp::stay;
 use circuits::{Circuits, Damping, RootChain};
@@ -406,15 +406,11 @@ impl DaviesStepper {
     }
 }
 
-/// Postures at which ranks are counted; the largest rank is the generic one.
-const GENERIC_POSTURES: usize = 3;
-
 /// Counts the ranks and compares what hard tasks impose with what the mechanism, and each group of circuits in it, can do.
 /// Remarks if they leave freedom.
 fn check_mobility(problem: &Problem, circuits: &mut Circuits) -> Result<Vec<String>, Declined> {
     let robot = problem.robot();
-    let postures: Vec<_> = (0..GENERIC_POSTURES).map(|k| generic_posture(robot, k)).collect();
-    circuits.count_ranks(problem, &postures);
+    circuits.count_ranks(problem, &generic_postures(robot));
     let name = |task: &usize| problem.tasks()[*task].name.clone();
     let groups = circuits.imposed();
     let fixed = circuits.imposed_root.map_or(0, |_| 6);
@@ -452,13 +448,4 @@ fn check_mobility(problem: &Problem, circuits: &mut Circuits) -> Result<Vec<Stri
         );
     }
     Ok(notes)
-}
-
-/// A posture without symmetry: multiples of the golden ratio, joints within ±1.
-fn generic_posture(robot: &ik_core::robot::Robot, k: usize) -> Vec<f64> {
-    const GOLDEN: f64 = 0.618_033_988_749_894_9;
-    #[allow(clippy::cast_precision_loss, reason = "small counts")]
-    let number = |i: usize| 2.0 * ((1 + i + 97 * k) as f64 * GOLDEN).fract() - 1.0;
-    let dq: Vec<f64> = (0..robot.nv()).map(number).collect();
-    ik_core::configuration::integrate(robot, &robot.neutral(), &dq)
 }
