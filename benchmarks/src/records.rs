@@ -141,8 +141,8 @@ pub struct Quality {
     /// (m). None also as before.
     #[serde(default)]
     pub zmp_gcom_distance_rms_m: Option<f64>,
-    /// Per secondary objective of the problem, by its kind: mean of its value over the samples in which one foot carries, over
-    /// k ≥ 0 in runs without such samples.
+    /// Per secondary objective of the problem, by its kind: mean of its value, of joint centring over k ≥ 0, of the gravity torque
+    /// over the samples in which one foot carries (k ≥ 0 in runs without such samples).
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub objective_mean: BTreeMap<String, f64>,
     /// Mean of the sum of squared static joint torques over the samples in which one foot carries (N²m²), the robot hanging
@@ -239,13 +239,15 @@ pub struct Effort {
 /// Columns: `t`; `base_x base_y base_z base_qx base_qy base_qz base_qw` if the root floats; one per joint by its name; then
 /// per task `<task>_target_<component>` (x y z, roll pitch yaw, or qx qy qz qw), the actual point `<task>_x _y _z` (m) of
 /// tasks that track one, `<task>_error_m` and/or `<task>_error_rad` (norm, angle), `<task>_rate_error_m_s` for the centre of mass; `step_us`, `majors`, `minors` (0 at
-/// k = 0); where the suite asks for torques `torque_<joint>` (Nm).
+/// k = 0); where the suite asks for torques or the problem names supports `torque_<joint>` (Nm), on the support of the phase in
+/// the latter case; `objective_<kind>` per secondary objective; where the problem names supports `standing_foot` (−1 where the right
+/// foot stands alone, 1 the left, 0 both).
 ///
 /// Where it names soles, all on the ground, in m and in the world: `gcom_x gcom_y` (projected centre of mass), `zmp_x zmp_y`
 /// (zero-moment point of point masses), `cart_zmp_x cart_zmp_y` (that of the cart), `support_x_min support_x_max
 /// support_y_min support_y_max` (extent of the support polygon), `gcom_margin zmp_margin` (signed distances to its border,
 /// positive inside). Accelerations at k = 0 and N are those at k = 1 and N − 1. Where the ground would have to pull there is
-/// no zero-moment point: `zmp_x zmp_y zmp_margin` are NaN.
+/// no zero-moment point: `zmp_x zmp_y zmp_margin` are NaN. Where it walks by preview control, `zmp_reference_x zmp_reference_y` last.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
     /// Column names.

@@ -89,7 +89,7 @@ pub struct Finished {
 }
 
 impl Finished {
-    /// The run over time; none if the method declined.
+    /// The run over time, at the samples that the suite keeps; none if the method declined.
     pub fn trace(&self, case: &Case) -> Option<Trace> {
         let efforts = StepEfforts {
             step_us: &self.step_us,
@@ -97,7 +97,16 @@ impl Finished {
             minors: &self.played.minors,
         };
         let run = judged_run(case, &self.played);
-        (!self.played.q.is_empty()).then(|| case.referee.trace(&run, &efforts))
+        if self.played.q.is_empty() {
+            return None;
+        }
+        let mut trace = case.referee.trace(&run, &efforts);
+        let (mut k, last) = (0, trace.rows.len().saturating_sub(1));
+        trace.rows.retain(|_| {
+            k += 1;
+            (k - 1) % case.trace_every == 0 || k - 1 == last
+        });
+        Some(trace)
     }
 }
 

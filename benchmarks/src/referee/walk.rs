@@ -11,6 +11,7 @@ use super::torque::static_torques;
 use super::tree::Posture;
 use super::{Readable, Referee, Run, Sample};
 use crate::records::Quality;
+use crate::statistics::mean;
 use crate::trajectory::Support;
 use ik_core::objective::Objective;
 use ik_core::problem::Problem;
@@ -88,16 +89,15 @@ fn judge_objectives(problem: &Problem, readable: &Readable<'_>, quality: &mut Qu
     if problem.objectives().is_empty() && !(walks && supported) {
         return;
     }
-    let mut sums: BTreeMap<&str, f64> = BTreeMap::new();
     let mut squares = Spread::default();
     let mut joints = vec![Spread::default(); problem.robot().coordinates().len()];
-    let mut count = 0_u32;
-    for (sample, posture) in readable.iter().filter(|(sample, _)| single(sample) || !walks) {
-        count += 1;
-        let torques = support_torques(problem, sample, posture);
+    let mut values: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for (sample, posture) in readable.iter() {
+        let carried = single(sample) || !walks;
+        let torques = support_torques(problem, sample, posture).filter(|_| carried);
         for objective in problem.objectives() {
             if let Some(value) = value(problem, objective, sample, torques.as_deref()) {
-                *sums.entry(word(objective)).or_default() += value;
+                values.entry(word(objective)).or_default().push(value);
             }
         }
         if let Some(torques) = torques.filter(|_| walks && supported) {
@@ -107,10 +107,12 @@ fn judge_objectives(problem: &Problem, readable: &Readable<'_>, quality: &mut Qu
             }
         }
     }
-    let means = sums
-        .into_iter()
-        .map(|(name, sum)| (name.to_owned(), sum / f64::from(count)));
-    quality.objective_mean = means.collect();
+    for (name, values) in values {
+        let mean = mean(&values);
+        quality
+            .objective_mean
+            .extend(mean.map(|mean| (name.to_owned(), mean)));
+    }
     quality.single_support_torque_squared_mean_n2m2 = squares.rms().map(|rms| rms * rms);
     for (coordinate, torque) in problem.robot().coordinates().iter().zip(joints) {
         if let Some(rms) = torque.rms() {
@@ -139,7 +141,7 @@ fn judge_drift(problem: &Problem, readable: &Readable<'_>, walk: &WalkReference,
         .windows(2)
         .map(|pair| change(problem, pair[0], pair[1]))
         .collect();
-    quality.joint_drift_mean_rad_per_cycle = crate::statistics::mean(&drifts);
+    quality.joint_drift_mean_rad_per_cycle = mean(&drifts);
     quality.joint_drift_last_rad_per_cycle = drifts.last().copied();
 }
 

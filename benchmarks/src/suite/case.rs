@@ -58,6 +58,8 @@ pub struct Case {
     gains: Vec<f64>,
     /// What the runs are compared with where they walk by preview control.
     pub walk: Option<WalkReference>,
+    /// Traces keep every so many samples.
+    pub trace_every: usize,
     /// Judges the runs.
     pub referee: Referee,
     /// Remarks for the rows.
@@ -113,21 +115,21 @@ impl Case {
             other => vec![format!("target rates: {}", other.word())],
         };
         let scenario = variation.label(&scenario.id);
-        let (suite, suite_dt_s) = (suite.id.clone(), suite.dt_s);
         Ok(Self {
-            suite,
+            suite: suite.id.clone(),
             scenario,
             spec,
             problem,
             q_start,
             dt_s,
-            suite_dt_s,
+            suite_dt_s: suite.dt_s,
             samples,
             support: trajectory.support(grid),
             phases: trajectory.phases(grid),
             gains,
             walk: trajectory.walk().map(|walk| reference(walk, grid)),
             trajectory,
+            trace_every: suite.trace_every,
             referee,
             notes,
         })

@@ -43,6 +43,9 @@ pub struct Suite {
     /// What each foot stands on, where balance is asked for.
     #[serde(default)]
     pub soles: Vec<SoleSpec>,
+    /// Traces keep every so many samples, and the last one; all without it.
+    #[serde(default = "every_sample")]
+    pub trace_every: usize,
     /// The problem of all scenarios.
     pub problem: ProblemSpec,
     /// Named start configurations.
@@ -55,6 +58,10 @@ pub struct Suite {
     /// Where it was read from, for messages.
     #[serde(skip)]
     pub source: String,
+}
+
+fn every_sample() -> usize {
+    1
 }
 
 /// What a foot stands on: a rectangle around the origin of a frame, in its x–y plane, x forwards.
@@ -227,6 +234,9 @@ impl Suite {
         source.clone_into(&mut suite.source);
         suite.problem.robot = suite.problem.robot.inlined(folder)?;
         check_id(&suite.id, "id", source, "/")?;
+        if suite.trace_every == 0 {
+            return Err(InputError::value(source, "trace_every", 0, "at least 1"));
+        }
         if suite.scenarios.is_empty() {
             return Err(InputError::value(source, "scenarios", "empty", "at least one"));
         }
