@@ -29,14 +29,19 @@ impl Secondary {
         }
     }
 
-    /// Evaluates p at `q`, whose tree pass is `page`; costs nothing without objectives or gains.
+    /// Whether any objective pulls in this step.
+    pub(crate) fn wanted(step: &ControlStep<'_>) -> bool {
+        step.gains.iter().any(|gain| *gain != 0.0)
+    }
+
+    /// Evaluates p at `q`, whose tree pass is `page`; costs nothing if no objective pulls.
     pub(crate) fn evaluate(
         &mut self,
         eval: &mut Evaluator,
         (q, page): (&[f64], &Page),
         step: &ControlStep<'_>,
     ) {
-        self.wanted = step.gains.iter().any(|gain| *gain != 0.0);
+        self.wanted = Self::wanted(step);
         if !self.wanted {
             return;
         }

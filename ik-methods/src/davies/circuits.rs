@@ -206,6 +206,11 @@ impl Circuits {
             page,
             instant,
         };
+        if let Some(rate) = at.secondary_rate() {
+            // Also of joints that no circuit touches.
+            let joints = v[problem.robot().root().nv()..].iter_mut();
+            joints.enumerate().for_each(|(j, v)| *v = rate(j));
+        }
         let root = self.imposed_root.map_or_else(Screw::default, |task| {
             let twist = at.root_twist(task);
             v[..3].copy_from_slice(twist.linear.as_slice());
@@ -374,6 +379,7 @@ impl Group {
         let (free, costed) = self.root.split(self.joints.len());
         let rows = self.stages[0].clear(free, costed);
         at.fill(&self.hard, self.root, root, place, rows);
+        at.lean(&self.joints, free + costed + 1, rows);
         self.stages[0].factorise(drop);
     }
 
@@ -381,6 +387,7 @@ impl Group {
     fn follow(&mut self, at: &Closing<'_>, root: &Screw, place: &[usize], drop: f64) {
         self.soft_rows.fill(0.0);
         at.fill(&self.soft, self.root, root, place, &mut self.soft_rows);
+        at.lean(&self.joints, self.unknowns() + 1, &mut self.soft_rows);
         let [hard, soft] = &mut self.stages;
         hard.follow(&mut self.soft_rows, soft);
         soft.factorise_followed(drop);
@@ -425,6 +432,11 @@ impl Group {
         let first = at.problem.robot().root().nv();
         for (&joint, rate) in self.joints.iter().zip(joints) {
             v[first + joint] = *rate;
+        }
+        if let Some(rate) = at.secondary_rate() {
+            self.joints
+                .iter()
+                .for_each(|&joint| v[first + joint] += rate(joint));
         }
         Quality {
             damped,
