@@ -24,9 +24,10 @@ use std::path::{Path, PathBuf};
 /// Marks the rows of a quick session: they are never taken for those of a full one.
 const QUICK_NOTE: &str = "quick session";
 
-/// All suites into one folder, with traces, figures and summary.
+/// All suites, a quick session those that are not for full ones only, into one folder, with traces, figures and summary.
 pub(super) fn everything(args: &Everything, out: &mut dyn Write) -> Result<(), Failure> {
-    let suites = Suite::load_embedded()?;
+    let mut suites = Suite::load_embedded()?;
+    suites.retain(|suite| !(args.effort.quick && suite.full_only));
     let heats = heats(
         &suites,
         &Selection::default(),

@@ -43,6 +43,9 @@ pub struct Suite {
     /// What each foot stands on, where balance is asked for.
     #[serde(default)]
     pub soles: Vec<SoleSpec>,
+    /// Whether `ik-bench --quick` leaves it out.
+    #[serde(default)]
+    pub full_only: bool,
     /// Traces keep every so many samples, and the last one; all without it.
     #[serde(default = "every_sample")]
     pub trace_every: usize,
