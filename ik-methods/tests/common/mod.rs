@@ -8,11 +8,7 @@ use ik_core::task::{OrientationCoordinates, Priority, Task, Track, Weights};
 use std::sync::Arc;
 
 /// The legs of COMAN on the left foot: centre of mass compromised with these weights, soles and torso hard, orientations as rpy.
-pub(crate) fn legs(
-    boundary: Boundary,
-    com_weights: Vec<f64>,
-    objectives: Vec<Objective>,
-) -> Arc<Problem> {
+pub(crate) fn legs(boundary: Boundary, com_weights: Vec<f64>, objectives: Vec<Objective>) -> Arc<Problem> {
     let robot = Arc::new(embedded("coman-legs").unwrap());
     let frame = |name: &str| robot.frame(name).unwrap();
     let tasks = [
