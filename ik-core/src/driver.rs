@@ -37,7 +37,7 @@ pub enum StepError {
     /// Δt that is not a positive number.
     #[error("dt_s = {0}: must be a finite number above 0")]
     TimeStep(f64),
-    /// A previous configuration or velocity that is not finite, or whose root quaternion is not of unit length.
+    /// A previous configuration, velocity or gain that is not finite, or whose root quaternion is not of unit length.
     #[error("{field}[{index}] = {value}: must be finite, and a root quaternion of unit length")]
     Value {
         /// Which vector.
@@ -140,7 +140,12 @@ impl Driver {
                 count: self.problem.phases().len(),
             });
         }
-        for (field, values) in [("q_prev", input.q_prev), ("v_prev", input.v_prev)] {
+        let numbers = [
+            ("q_prev", input.q_prev),
+            ("v_prev", input.v_prev),
+            ("gains", input.gains),
+        ];
+        for (field, values) in numbers {
             if let Some((index, value)) = values.iter().enumerate().find(|(_, v)| !v.is_finite()) {
                 return Err(StepError::Value {
                     field,

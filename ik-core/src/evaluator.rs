@@ -2,6 +2,7 @@
 
 use crate::kinematics::second_order::SecondOrder;
 use crate::kinematics::{Page, forward};
+use crate::objective::{At, Scratch};
 use crate::problem::{PhaseId, Problem};
 use crate::robot::Robot;
 use crate::rows::Rows;
@@ -61,6 +62,7 @@ impl Meter {
 #[derive(Clone, Debug)]
 pub struct Evaluator {
     problem: Arc<Problem>,
+    objectives: Scratch,
     /// Budget and counts of the current step.
     pub meter: Meter,
 }
@@ -97,6 +99,7 @@ impl Evaluator {
     pub fn new(problem: &Arc<Problem>) -> Self {
         Self {
             problem: Arc::clone(problem),
+            objectives: Scratch::new(problem.robot()),
             meter: Meter::default(),
         }
     }
@@ -172,14 +175,31 @@ impl Evaluator {
         rows.fill_second(self.problem.robot(), page, second, target.x, u, &mut lin.hard);
     }
 
-    /// Adds the gain-weighted gradients of the problem's objectives to `gradient` (length nv); returns the weighted sum
-    /// of their values.
-    pub fn add_objectives(&self, q: &[f64], gains: &[f64], gradient: &mut [f64]) -> f64 {
-        let robot = self.problem.robot();
-        let objectives = self.problem.objectives().iter().zip(gains);
-        objectives
-            .map(|(o, &gain)| gain * o.add_gradient(robot, q, gain, gradient))
-            .sum()
+    /// Adds the gradient of `Σ γ H` (Melson, eq. (14)) to `gradient` (length nv; nothing to a root) and returns the sum: the
+    /// problem's objectives, weighted by the gains of the step, at `q` with its `page` and with the support of `phase`.
+    ///
+    /// No tree pass. An objective whose gain is zero costs nothing.
+    pub fn add_objectives(
+        &mut self,
+        q: &[f64],
+        page: &Page,
+        phase: PhaseId,
+        gains: &[f64],
+        gradient: &mut [f64],
+    ) -> f64 {
+        let at = At {
+            robot: self.problem.robot(),
+            q,
+            page,
+            support: self.problem.phases()[phase.0].support,
+        };
+        let mut sum = 0.0;
+        for (objective, &gain) in self.problem.objectives().iter().zip(gains) {
+            if gain != 0.0 {
+                sum += gain * objective.add_gradient(at, gain, gradient, &mut self.objectives);
+            }
+        }
+        sum
     }
 
     /// Lends at most `majors` of the budget to `inner`: a wrapper cannot spend more on an inner method than it decided.

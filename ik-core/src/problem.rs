@@ -2,7 +2,7 @@
 
 use crate::boundary::{Boundary, BoundaryError};
 use crate::objective::Objective;
-use crate::robot::Robot;
+use crate::robot::{FrameId, Robot};
 use crate::rows::RowLayout;
 use crate::task::{OrientationCoordinates, Priority, Task, Track, Weights};
 use serde::{Deserialize, Serialize};
@@ -19,6 +19,9 @@ pub struct Phase {
     pub name: String,
     /// `(index of the task, its priority)`, in the order of the rows; hard rows and soft rows are stacked separately.
     pub tasks: Vec<(usize, Priority)>,
+    /// The frame that carries the robot, a foot say; none if it is not known. Gravity torques are those of the tree hanging
+    /// from it, and a method may take it as its base. A fixed root carries its robot itself.
+    pub support: Option<FrameId>,
 }
 
 /// What a step is.
@@ -94,6 +97,47 @@ pub enum ProblemError {
         /// Number of frames.
         count: usize,
     },
+    /// A phase supported by a frame that the robot lacks.
+    #[error("phase `{phase}` is supported by frame {frame}, but `{robot}` has {count} frames")]
+    Support {
+        /// Name of the phase.
+        phase: String,
+        /// Index found.
+        frame: usize,
+        /// Name of the robot.
+        robot: String,
+        /// Number of frames.
+        count: usize,
+    },
+    /// Gravity torques of a floating robot in a phase without support.
+    #[error(
+        "gravity torques of `{robot}` depend on the foot it stands on, but phase `{phase}` names no support"
+    )]
+    NoSupport {
+        /// Name of the phase.
+        phase: String,
+        /// Name of the robot.
+        robot: String,
+    },
+    /// Joint centring of joints without a middle.
+    #[error(
+        "joint centring needs two different finite limits of every joint; `{robot}` lacks them for {}",
+        .joints.join(", ")
+    )]
+    NoRange {
+        /// Name of the robot.
+        robot: String,
+        /// The joints without.
+        joints: Vec<String>,
+    },
+    /// Weights of gravity torques of the wrong number or not positive.
+    #[error("weights of the gravity torques: {found}; allowed: {allowed}")]
+    TorqueWeights {
+        /// What was found.
+        found: String,
+        /// What is allowed.
+        allowed: String,
+    },
     /// The centre of mass of a robot without moving mass.
     #[error("task `{task}` tracks the centre of mass, but `{robot}` has no moving mass")]
     Massless {
@@ -146,6 +190,9 @@ impl Problem {
     /// The first inconsistency found, naming task, phase or field.
     pub fn new(parts: ProblemParts) -> Result<Self, ProblemError> {
         check_tasks(&parts)?;
+        for objective in &parts.objectives {
+            objective.check(&parts.robot, &parts.phases)?;
+        }
         parts.boundary.validate(&parts.robot)?;
         if parts.kind == Kind::Pose && parts.boundary.bounds_velocity() {
             return Err(ProblemError::PoseVelocity(parts.boundary));
@@ -274,6 +321,15 @@ fn check_track(parts: &ProblemParts, task: &Task) -> Result<(), ProblemError> {
 fn check_phase(parts: &ProblemParts, phase: &Phase) -> Result<(), ProblemError> {
     if phase.tasks.is_empty() {
         return Err(ProblemError::NoTask(format!("phase `{}`", phase.name)));
+    }
+    let count = parts.robot.frames().len();
+    if let Some(frame) = phase.support.filter(|f| f.0 >= count) {
+        return Err(ProblemError::Support {
+            phase: phase.name.clone(),
+            frame: frame.0,
+            robot: parts.robot.name().to_owned(),
+            count,
+        });
     }
     for (i, (task, priority)) in phase.tasks.iter().enumerate() {
         let twice = phase.tasks[..i].iter().any(|(other, _)| other == task);

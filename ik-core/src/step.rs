@@ -20,7 +20,7 @@ pub struct ControlStep<'a> {
     pub targets: Window<'a>,
     /// Admissible Δq.
     pub bounds: Bounds<'a>,
-    /// One gain per objective of the problem, already ramped.
+    /// One gain γ per objective of the problem, already ramped; the objective moves the joints by `−γ ∇H` per second.
     pub gains: &'a [f64],
 }
 

@@ -3,12 +3,11 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use ik_core::kinematics::successive::ZeroPose;
+mod specification;
+
 use ik_core::kinematics::{Page, forward};
 use ik_core::robot::{Limits, Motion, Robot, Root, embedded};
-use nalgebra::{Point3, Vector3};
-use serde_json::Value;
-use std::path::Path;
+use nalgebra::Vector3;
 
 fn bioloid() -> Robot {
     embedded("bioloid").unwrap()
@@ -114,71 +113,9 @@ fn joints_come_in_the_order_of_the_source_and_have_no_limit() {
     }
 }
 
-fn vector(value: &Value) -> Vector3<f64> {
-    Vector3::from_iterator(value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()))
-}
-
-/// The specification beside the project, `None` (with a message) where it is not there.
-fn specification() -> Option<Value> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/papers/bioloid-spec.json");
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        eprintln!("skipped: the specification is not installed ({})", path.display());
-        return None;
-    };
-    Some(serde_json::from_str(&text).unwrap())
-}
-
 #[test]
 fn every_joint_mass_and_frame_is_that_of_the_specification() {
-    let Some(specification) = specification() else {
-        return;
-    };
-    let robot = bioloid();
-    let zero = ZeroPose::of(&robot);
-    let mover = |body: usize| body.checked_sub(1).map_or("root", |j| &robot.joints()[j].name);
-    let assert_mass = |body: usize, given: &Value| {
-        let found = &robot.bodies()[body];
-        let name = &found.name;
-        assert!(
-            (found.mass_kg - given["mass"].as_f64().unwrap()).abs() < 1e-12,
-            "{name}"
-        );
-        if found.mass_kg > 0.0 {
-            let com = zero.frames()[robot.frame(name).unwrap().0] * Point3::from(found.com);
-            assert!(
-                (com.coords - vector(&given["com"])).amax() < 1e-12,
-                "{name} {com}"
-            );
-        }
-    };
-    assert_mass(0, &specification["root"]);
-    let joints = specification["joints"].as_array().unwrap();
-    assert_eq!(joints.len(), robot.joints().len());
-    for (i, (joint, given)) in robot.joints().iter().zip(joints).enumerate() {
-        assert_eq!(joint.name, given["name"].as_str().unwrap());
-        assert_eq!(
-            mover(joint.parent),
-            given["parent"].as_str().unwrap(),
-            "{}",
-            joint.name
-        );
-        let line = zero.lines()[i];
-        assert!((line.axis - vector(&given["s"])).amax() < 1e-12, "{}", joint.name);
-        assert!(
-            (line.point - vector(&given["s0"])).amax() < 1e-12,
-            "{}",
-            joint.name
-        );
-        assert_mass(i + 1, given);
-    }
-    for given in specification["frames"].as_array().unwrap() {
-        let id = robot.frame(given["name"].as_str().unwrap()).unwrap();
-        assert_eq!(mover(robot.frames()[id.0].body), given["link"].as_str().unwrap());
-        let found = zero.frames()[id.0].translation.vector;
-        assert!(
-            (found - vector(&given["point"])).amax() < 1e-12,
-            "{}",
-            given["name"]
-        );
+    if let Some(specification) = specification::read("bioloid-spec.json") {
+        specification::assert_described(&bioloid(), &specification);
     }
 }

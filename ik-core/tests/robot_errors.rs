@@ -537,8 +537,8 @@ fn questions_a_robot_cannot_answer_list_what_there_is() {
     );
     assert_eq!(
         message(embedded("arm8").map(|_| ())),
-        "no embedded robot is named `arm8`; embedded robots: coman, coman-legs, coman-legs-hyperextension, bioloid, hubo, \
-         hoap2, hrp2, asimo, arm6, arm7, slider-arm, pendulum"
+        "no embedded robot is named `arm8`; embedded robots: coman, coman-legs, coman-legs-hyperextension, bioloid, melson, \
+         hubo, hoap2, hrp2, asimo, arm6, arm7, slider-arm, pendulum"
     );
 }
 

@@ -563,9 +563,10 @@ fn swap_quoted(text: &mut String, start: usize, other: prop::sample::Index) {
     text.replace_range(from..to, &value);
 }
 
-const TEXTS: [&str; 10] = [
+const TEXTS: [&str; 11] = [
     include_str!("../robots/coman.urdf"),
     include_str!("../robots/bioloid.urdf"),
+    include_str!("../robots/melson.urdf"),
     include_str!("../robots/hubo.urdf"),
     include_str!("../robots/hoap2.urdf"),
     include_str!("../robots/hrp2.urdf"),

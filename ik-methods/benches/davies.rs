@@ -53,6 +53,7 @@ fn bioloid(free_root: &[&str]) -> Arc<Problem> {
         tasks: tasks.iter().map(named).collect(),
         phases: vec![Phase {
             name: "whole".into(),
+            support: None,
             tasks: tasks
                 .iter()
                 .enumerate()

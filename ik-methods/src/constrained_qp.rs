@@ -10,6 +10,8 @@
 //! ## Step
 //! (S1) Solve the program, g being an exact interval of each Δq_j. (S2) q = q⁻ ⊕ Δq, q̇ = Δq/Δt.
 //!
+//! Objectives of the problem are the reference of the regularisation as in IK1: `(Δq − p)ᵀ R (Δq − p)`, p = Δt q̇₀.
+//!
 //! ## What it needs
 //! Targets x and a boundary (without one it is IK1).
 //!
@@ -25,6 +27,7 @@
 
 use crate::error_integration::{DAMPING_FIELD, damped_step};
 use crate::registry::{Field, Method, MethodInfo, Parameters};
+use crate::secondary::Secondary;
 use crate::step_qp::{StepQp, conclude, finish, stay};
 use ik_core::evaluator::{Evaluator, Linearisation};
 use ik_core::formulation::{
@@ -79,12 +82,13 @@ impl Formulation for ConstrainedQp {
             damping: self.parameters.damping,
             lin: Linearisation::new(problem),
             qp: StepQp::new(problem),
+            secondary: Secondary::new(problem),
             zero: vec![0.0; problem.robot().nv()],
         };
         let honours = Honours {
             boundary: true,
             hard_rows: false,
-            objective: Use::Ignored,
+            objective: Use::Regularised,
             allocation_free: true,
             counts: Trust::Metered,
         };
@@ -103,6 +107,7 @@ struct ConstrainedQpStepper {
     damping: f64,
     lin: Linearisation,
     qp: StepQp,
+    secondary: Secondary,
     zero: Vec<f64>,
 }
 
@@ -114,7 +119,10 @@ impl Stepper for ConstrainedQpStepper {
         }
         self.qp.reset();
         self.qp.bound(&step.bounds, &self.zero);
-        let outcome = damped_step(&mut self.qp, &mut self.lin, step, step.q_prev, self.damping, eval);
+        eval.linearise(step.q_prev, step.phase, step.targets.now(), &mut self.lin);
+        self.secondary.evaluate(eval, (step.q_prev, &self.lin.page), step);
+        let pull = self.secondary.increment();
+        let outcome = damped_step(&mut self.qp, &self.lin, self.damping, pull, eval);
         finish(&self.problem, step, &mut self.qp.solution.x, out);
         conclude(outcome, Termination::Stepped, step, out)
     }

@@ -11,6 +11,8 @@
 //! (S1) Sequential quadratic programming with the exact derivative J + γ (J + ∂J (q − q⁻)) of every row, see `sqp.rs`.
 //! (S2) q̇ = (q − q⁻)/Δt.
 //!
+//! Objectives of the problem add `μ ‖q − q⁻ − p‖²` to the cost, μ being `proximal` and p = Δt q̇₀ (`secondary.rs`).
+//!
 //! ## What it needs
 //! Targets x and ẋ; a boundary (without one it is an undamped Newton method).
 //!
@@ -208,7 +210,7 @@ pub(crate) fn prepared(stepper: impl Stepper + 'static, majors: u32, hard_rows: 
     let honours = Honours {
         boundary: true,
         hard_rows,
-        objective: Use::Ignored,
+        objective: Use::Regularised,
         allocation_free: true,
         counts: Trust::Metered,
     };

@@ -10,6 +10,9 @@
 //! ## Step
 //! (S1) Solve the KKT system for Δq, λ with E = x − f(q⁻). (S2) q = q⁻ ⊕ Δq, q̇ = Δq/Δt.
 //!
+//! Objectives of the problem are the reference of the regularisation: `(Δq − p)ᵀ R (Δq − p)` with p = Δt q̇₀, see
+//! `secondary.rs`. Hard rows are not disturbed, compromised ones by as much as R weighs.
+//!
 //! ## What it needs
 //! Targets x. Knows no boundary: positions and velocities are whatever the step gives.
 //!
@@ -28,6 +31,7 @@
 
 use crate::qp::Outcome;
 use crate::registry::{Allowed, Field, Method, MethodInfo, Parameters};
+use crate::secondary::Secondary;
 use crate::step_qp::{Stack, StepQp, conclude, finish_unbounded, stay};
 use ik_core::evaluator::{Evaluator, Linearisation};
 use ik_core::formulation::{
@@ -93,11 +97,12 @@ impl Formulation for ErrorIntegration {
             damping: self.parameters.damping,
             lin: Linearisation::new(problem),
             qp: StepQp::new(problem),
+            secondary: Secondary::new(problem),
         };
         let honours = Honours {
             boundary: false,
             hard_rows: false,
-            objective: Use::Ignored,
+            objective: Use::Regularised,
             allocation_free: true,
             counts: Trust::Metered,
         };
@@ -116,6 +121,7 @@ struct ErrorIntegrationStepper {
     damping: f64,
     lin: Linearisation,
     qp: StepQp,
+    secondary: Secondary,
 }
 
 impl Stepper for ErrorIntegrationStepper {
@@ -126,7 +132,10 @@ impl Stepper for ErrorIntegrationStepper {
         }
         self.qp.reset();
         self.qp.free();
-        let outcome = damped_step(&mut self.qp, &mut self.lin, step, step.q_prev, self.damping, eval);
+        eval.linearise(step.q_prev, step.phase, step.targets.now(), &mut self.lin);
+        self.secondary.evaluate(eval, (step.q_prev, &self.lin.page), step);
+        let pull = self.secondary.increment();
+        let outcome = damped_step(&mut self.qp, &self.lin, self.damping, pull, eval);
         finish_unbounded(&self.problem, step, &self.qp.solution.x, out);
         conclude(outcome, Termination::Stepped, step, out)
     }
@@ -136,17 +145,19 @@ impl Stepper for ErrorIntegrationStepper {
     }
 }
 
-/// Linearises at `q` and solves eq. (1) there (eq. (7) if `qp` is bounded) for the increment from `q`.
+/// Solves eq. (1) (eq. (7) if `qp` is bounded) at the linearised configuration for the increment from there, R pulling it
+/// towards `pull`, to zero without one.
 pub(crate) fn damped_step(
     qp: &mut StepQp,
-    lin: &mut Linearisation,
-    step: &ControlStep<'_>,
-    q: &[f64],
+    lin: &Linearisation,
     damping: f64,
+    pull: Option<&[f64]>,
     eval: &mut Evaluator,
 ) -> Outcome {
-    eval.linearise(q, step.phase, step.targets.now(), lin);
     qp.start(damping);
+    if let Some(pull) = pull {
+        qp.centre(damping, pull);
+    }
     qp.add(Stack {
         matrix: &lin.soft.jacobian,
         ld: lin.soft.ld(),

@@ -12,6 +12,9 @@
 //! (S1) Repeat n times, or until the step is below the tolerance: solve IK1's system at the current iterate, R damping
 //! the step (not the distance from q⁻); q ← q ⊕ d. (S2) Solve the second problem for q̇.
 //!
+//! Objectives of the problem are the reference of the regularisation: R pulls the first iteration's step towards p = Δt q̇₀
+//! (`secondary.rs`) and Δt q̇ in (S2) likewise. Later iterations are damped as ever and so do not go that way again.
+//!
 //! ## What it needs
 //! Targets x and ẋ.
 //!
@@ -32,6 +35,7 @@ use crate::error_integration::{DAMPING_FIELD, damped_step};
 use crate::projected_cg::ProjectedCg;
 use crate::qp::{Outcome, QpStatus};
 use crate::registry::{Allowed, Field, Method, MethodInfo, N_FIELD, Parameters};
+use crate::secondary::Secondary;
 use crate::step_qp::{Stack, StepQp, conclude, stay};
 use ik_core::configuration::integrate_into;
 use ik_core::evaluator::{Evaluator, Linearisation};
@@ -133,6 +137,7 @@ impl Formulation for GaussNewton {
             parameters: self.parameters.clone(),
             lin: Linearisation::new(problem),
             qp: StepQp::new(problem),
+            secondary: Secondary::new(problem),
             cg: ProjectedCg::new(
                 problem.robot().nv(),
                 problem.largest_hard_rows(),
@@ -150,7 +155,7 @@ impl Formulation for GaussNewton {
         let honours = Honours {
             boundary: false,
             hard_rows: true,
-            objective: Use::Ignored,
+            objective: Use::Regularised,
             allocation_free: true,
             counts: Trust::Metered,
         };
@@ -169,6 +174,7 @@ struct GaussNewtonStepper {
     parameters: GaussNewtonParameters,
     lin: Linearisation,
     qp: StepQp,
+    secondary: Secondary,
     cg: ProjectedCg,
     q: Vec<f64>,
     /// −ẋ Δt of the rows.
@@ -183,8 +189,10 @@ impl Stepper for GaussNewtonStepper {
         self.q.copy_from_slice(step.q_prev);
         let mut outcome = Outcome::Solved;
         let mut ended = Termination::Budget;
+        let mut iteration = 0;
         while eval.meter.next_major() {
-            outcome = self.increment(step, eval);
+            outcome = self.increment(step, iteration, eval);
+            iteration += 1;
             if matches!(outcome, Outcome::Failed(_)) {
                 return conclude(outcome, ended, step, out);
             }
@@ -208,13 +216,18 @@ impl Stepper for GaussNewtonStepper {
 }
 
 impl GaussNewtonStepper {
-    fn increment(&mut self, step: &ControlStep<'_>, eval: &mut Evaluator) -> Outcome {
+    fn increment(&mut self, step: &ControlStep<'_>, iteration: u32, eval: &mut Evaluator) -> Outcome {
         let damping = self.parameters.damping;
+        eval.linearise(&self.q, step.phase, step.targets.now(), &mut self.lin);
+        if iteration == 0 {
+            self.secondary.evaluate(eval, (&self.q, &self.lin.page), step);
+        }
+        let pull = self.secondary.increment().filter(|_| iteration == 0);
         match self.parameters.inner {
-            Inner::Direct => damped_step(&mut self.qp, &mut self.lin, step, &self.q, damping, eval),
+            Inner::Direct => damped_step(&mut self.qp, &self.lin, damping, pull, eval),
             Inner::Cg => {
-                eval.linearise(&self.q, step.phase, step.targets.now(), &mut self.lin);
-                let Some(iterations) = self.cg.solve(&self.lin, damping, &mut self.qp.solution.x) else {
+                let x = &mut self.qp.solution.x;
+                let Some(iterations) = self.cg.solve(&self.lin, damping, pull, x) else {
                     return Outcome::Failed(QpStatus::Numerical);
                 };
                 eval.meter.minors(iterations);
@@ -222,7 +235,7 @@ impl GaussNewtonStepper {
                     return Outcome::Solved;
                 }
                 // Dependent or contradicting rows: elimination decides which, and reports it.
-                damped_step(&mut self.qp, &mut self.lin, step, &self.q, damping, eval)
+                damped_step(&mut self.qp, &self.lin, damping, pull, eval)
             }
         }
     }
@@ -232,6 +245,9 @@ impl GaussNewtonStepper {
         eval.linearise(&self.q, step.phase, step.targets.now(), &mut self.lin);
         let lin = &self.lin;
         self.qp.start(self.parameters.damping);
+        if let Some(pull) = self.secondary.increment() {
+            self.qp.centre(self.parameters.damping, pull);
+        }
         scaled(&lin.soft.rate, -step.dt_s, &mut self.rate);
         let (ld, residual) = (lin.soft.ld(), &self.rate[..lin.soft.ld().min(self.rate.len())]);
         self.qp.add(Stack {

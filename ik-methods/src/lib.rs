@@ -9,13 +9,18 @@ pub mod davies;
 pub mod direct_position;
 pub mod error_integration;
 pub mod gauss_newton;
+mod generic_posture;
+mod least_norm;
+pub mod null_space_clik;
 mod projected_cg;
 pub mod qp;
 pub mod registry;
 pub mod reverse_decoupling;
+mod secondary;
 mod sqp;
 pub mod start;
 mod step_qp;
+mod support_base;
 #[cfg(test)]
 mod testing;
 pub mod two_slack;

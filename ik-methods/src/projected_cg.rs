@@ -1,7 +1,7 @@
 //! Projected conjugate gradients for one damped least-squares system with equality rows:
 //!
 //! ```text
-//! minimise ½ ‖J_s d + e_s‖² + ½ R ‖d‖²    subject to  J_h d = −e_h
+//! minimise ½ ‖J_s d + e_s‖² + ½ R ‖d − p‖²    subject to  J_h d = −e_h
 //! ```
 //!
 //! Source: Gould, Hribar & Nocedal (2001), On the solution of equality constrained quadratic programming problems arising
@@ -55,9 +55,15 @@ impl ProjectedCg {
             .fold(0.0, f64::max)
     }
 
-    /// Solves at the linearised configuration into `d`; returns the number of iterations, none if the gradient is not
-    /// finite.
-    pub(crate) fn solve(&mut self, lin: &Linearisation, damping: f64, d: &mut [f64]) -> Option<u32> {
+    /// Solves at the linearised configuration into `d`, p being `pull`, zero without one; returns the number of iterations,
+    /// none if the gradient is not finite.
+    pub(crate) fn solve(
+        &mut self,
+        lin: &Linearisation,
+        damping: f64,
+        pull: Option<&[f64]>,
+        d: &mut [f64],
+    ) -> Option<u32> {
         factorise_gram(&lin.hard, &mut self.gram);
         // d₀ = −J_hᵀ (J_h J_hᵀ)⁻¹ e_h meets the rows.
         let m = lin.hard.rows();
@@ -75,6 +81,9 @@ impl ProjectedCg {
             &mut self.residual,
         );
         lin.soft.add_transposed(&lin.soft.error, 1.0, &mut self.residual);
+        if let Some(pull) = pull {
+            axpy(-damping, pull, &mut self.residual);
+        }
         self.project(lin);
         for (p, g) in self.direction.iter_mut().zip(&self.projected) {
             *p = -g;

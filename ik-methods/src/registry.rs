@@ -7,6 +7,7 @@ use crate::davies::{self, Davies};
 use crate::direct_position::DirectPosition;
 use crate::error_integration::ErrorIntegration;
 use crate::gauss_newton::GaussNewton;
+use crate::null_space_clik::NullSpaceClik;
 use crate::reverse_decoupling::formulation::ReverseDecoupling;
 use crate::two_slack::TwoSlack;
 use ik_core::formulation::Formulation;
@@ -26,6 +27,7 @@ pub static METHODS: &[Entry] = &[
     entry::<Davies>(),
     preset::<Davies>(davies::OPEN_LOOP),
     entry::<ReverseDecoupling>(),
+    entry::<NullSpaceClik>(),
     entry::<PenaltyCg>(),
     entry::<PenaltyLbfgs>(),
 ];

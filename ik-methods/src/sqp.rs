@@ -9,9 +9,14 @@
 //! searches along its step on the L1 merit ½‖r‖² + ρ‖c‖₁ (on ‖c‖₂ where the hard rows had to be relaxed). It stops when the step is below the tolerance; the gradient of
 //! the Lagrangian is then below (‖A‖² + μ) times the tolerance, so step size and KKT residual end together. It never stops
 //! on a small decrease: leaving a straight knee gains only 1e-9 m² at first (notes §3).
+//!
+//! Objectives of the problem give μ a reference that stays: the weight is then not around the iterate but a term
+//! `½ μ ‖q ⊖ q⁻ − p‖²` of the problem, p = Δt q̇₀ (`secondary.rs`). Hard rows are not disturbed, soft ones
+//! by as much as μ weighs.
 
 use crate::gauss_newton::largest;
 use crate::qp::{Outcome, QpStatus};
+use crate::secondary::Secondary;
 use crate::start::{Escape, StartParameters};
 use crate::step_qp::{Stack, StepQp, conclude, finish, stay};
 use ik_core::configuration::{difference_into, integrate_into};
@@ -125,6 +130,7 @@ pub(crate) struct Sqp<M> {
     parameters: SqpParameters,
     qp: StepQp,
     escape: Escape,
+    secondary: Secondary,
     now: Point,
     trial: Point,
     /// Hard rows at the end of a program's step.
@@ -138,7 +144,7 @@ struct Point {
     dq: Vec<f64>,
     lin: Linearisation,
     residuals: Residuals,
-    /// ½‖r‖².
+    /// ½‖r‖², and the pull of objectives.
     half_squares: f64,
 }
 
@@ -167,6 +173,7 @@ impl<M: Model> Sqp<M> {
                 parameters.start,
                 M::soft_rows(problem.largest_soft_rows()),
             ),
+            secondary: Secondary::new(problem),
             now: point.clone(),
             trial: point,
             predicted,
@@ -191,6 +198,7 @@ impl<M: Model> Sqp<M> {
         self.escape.start(&self.model, step, eval, &mut self.now.dq);
         integrate_into(self.problem.robot(), step.q_prev, &self.now.dq, &mut self.now.q);
         self.evaluate(step, eval, Which::Now);
+        self.pull(step, eval);
         let (ended, outcome) = self.iterate(step, eval, out);
         finish(&self.problem, step, &mut self.now.dq, out);
         conclude(outcome, ended, step, out)
@@ -248,6 +256,10 @@ impl<M: Model> Sqp<M> {
             &mut now.residuals,
         );
         self.qp.start(self.parameters.proximal);
+        if let Some(pull) = self.secondary.increment() {
+            self.qp.centre(self.parameters.proximal, pull);
+            self.qp.centre(-self.parameters.proximal, &now.dq);
+        }
         self.qp.add(now.residuals.soft.stack());
         self.qp.bound(&step.bounds, &now.dq);
         let hard = self.model.hard(&now.lin, &now.residuals);
@@ -278,6 +290,7 @@ impl<M: Model> Sqp<M> {
         for halving in 0..=HALVINGS {
             self.move_trial(step);
             self.evaluate(step, eval, Which::Trial);
+            self.trial.half_squares += self.pulled(&self.trial.dq);
             let enough = start + SUFFICIENT * t * slope.min(0.0) + ROUNDING * start;
             if self.merit(merit, Which::Trial) <= enough || halving == HALVINGS {
                 break;
@@ -324,6 +337,26 @@ impl<M: Model> Sqp<M> {
         self.model
             .residuals(eval, lin, target, &point.dq, step.dt_s, residuals);
         point.half_squares = 0.5 * point.residuals.soft.residual.iter().map(|r| r * r).sum::<f64>();
+    }
+
+    /// Evaluates p at q⁻, which needs a tree pass of its own only if the iteration starts elsewhere.
+    fn pull(&mut self, step: &ControlStep<'_>, eval: &mut Evaluator) {
+        let mut page = &self.now.lin.page;
+        if Secondary::wanted(step) && self.now.dq.iter().any(|d| *d != 0.0) {
+            eval.pass(step.q_prev, &mut self.trial.lin.page);
+            page = &self.trial.lin.page;
+        }
+        self.secondary.evaluate(eval, (step.q_prev, page), step);
+        self.now.half_squares += self.pulled(&self.now.dq);
+    }
+
+    /// `½ μ ‖dq − p‖²` of an iterate `dq` from q⁻; zero without objectives.
+    fn pulled(&self, dq: &[f64]) -> f64 {
+        let Some(pull) = self.secondary.increment() else {
+            return 0.0;
+        };
+        let squares = dq.iter().zip(pull).map(|(d, p)| (d - p) * (d - p));
+        0.5 * self.parameters.proximal * squares.sum::<f64>()
     }
 
     /// Multipliers of the last program, with everything but the plain task rows as the method's own gradient.

@@ -74,6 +74,13 @@ impl StepQp {
         self.hessian.iter_mut().step_by(n + 1).for_each(|h| *h = weight);
     }
 
+    /// Moves the centre of `½ weight ‖d‖²` to `centre` (length n): adds what this changes, `−weight centre`, to the gradient.
+    pub(crate) fn centre(&mut self, weight: f64, centre: &[f64]) {
+        for (g, c) in self.gradient.iter_mut().zip(centre) {
+            *g -= weight * c;
+        }
+    }
+
     /// Adds `½ ‖A d + r‖²`: the lower triangle of AᵀA, which [`StepQp::solve`] mirrors.
     ///
     /// Optimisation: four rows of A at a time, transposed, so that columns of H are written contiguously.

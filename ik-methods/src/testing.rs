@@ -22,6 +22,7 @@ pub(crate) fn arm_problem(robot: &str, value: f64) -> (Arc<Problem>, Vec<f64>) {
         }],
         phases: vec![Phase {
             name: "all".into(),
+            support: None,
             tasks: vec![(0, Priority::Compromised(Weights::Uniform(1.0)))],
         }],
         boundary: Boundary::None,

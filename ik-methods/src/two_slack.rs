@@ -11,6 +11,8 @@
 //! (S1) Sequential quadratic programming on the stacked rows [f − x; √γ (J (q − q⁻) − ẋΔt)], exact derivatives, see
 //! `sqp.rs`. (S2) q̇ = (q − q⁻)/Δt.
 //!
+//! Objectives of the problem add `μ ‖q − q⁻ − p‖²` to the cost, μ being `proximal` and p = Δt q̇₀ (`secondary.rs`).
+//!
 //! ## What it needs
 //! Targets x and ẋ; a boundary.
 //!

@@ -12,6 +12,7 @@ mod common;
 use common::legs;
 use ik_core::boundary::Boundary;
 use ik_core::driver::{Driver, StepInput};
+use ik_core::objective::Objective;
 use ik_core::problem::PhaseId;
 use ik_core::step::Window;
 use ik_methods::registry::METHODS;
@@ -58,7 +59,11 @@ fn sample(k: u32) -> Vec<f64> {
 
 #[test]
 fn a_step_allocates_nothing_where_it_is_promised() {
-    let problem = legs(Boundary::Ellipse { margin: 0.0 }, vec![1.0, 2.0, 3.0]);
+    let objectives = vec![
+        Objective::JointCentring,
+        Objective::GravityTorque { weights: None },
+    ];
+    let problem = legs(Boundary::Ellipse { margin: 0.0 }, vec![1.0, 2.0, 3.0], objectives);
     let mut promised = 0;
     for entry in METHODS {
         let variants: &[&str] = match entry.info().id {
@@ -70,6 +75,11 @@ fn a_step_allocates_nothing_where_it_is_promised() {
                 "integrator = 'rk4'\nfeed_forward = 'given'",
                 "orientation = 'euler-rates'",
                 "damping = 0.01",
+            ],
+            "clik" => &[
+                "",
+                "inverse = 'damped'",
+                "inverse = 'truncated'\ncorrection = 0.5",
             ],
             _ => &[""],
         };
@@ -91,7 +101,7 @@ fn a_step_allocates_nothing_where_it_is_promised() {
                     dt_s: 0.01,
                     phase: PhaseId(0),
                     targets: Window::new(&samples[(k - 1) * 36..(k + 1) * 36], 18, 18).unwrap(),
-                    gains: &[],
+                    gains: &[0.1, 1e-4],
                 };
                 let majors = driver.majors();
                 let before = ALLOCATIONS.with(Cell::get);

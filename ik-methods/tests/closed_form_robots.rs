@@ -96,8 +96,8 @@ fn every_limb_of_every_embedded_robot_is_solved() {
         .iter()
         .map(|robot| check(&embedded(robot.id).unwrap()))
         .sum();
-    // Two legs each of COMAN (three models), Bioloid and the four humanoids, two arms each of these, one arm of six joints.
-    assert_eq!(count, 2 * 3 + 2 + 4 * 4 + 1);
+    // Two legs each of COMAN (three models), Bioloid, Melson and the four humanoids, two arms each of these, one arm of six joints.
+    assert_eq!(count, 2 * 3 + 2 + 2 + 4 * 4 + 1);
 }
 
 #[test]

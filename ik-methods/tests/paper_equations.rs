@@ -57,7 +57,7 @@ struct Fixture {
 
 impl Fixture {
     fn new(boundary: Boundary, knee: f64, by: f64) -> Self {
-        let problem = legs(boundary, vec![1.0, 2.0, 0.5]);
+        let problem = legs(boundary, vec![1.0, 2.0, 0.5], vec![]);
         let q = stance(&problem, knee);
         let mut page = ik_core::kinematics::Page::new(problem.robot());
         ik_core::kinematics::forward(problem.robot(), &q, &mut page);

@@ -174,6 +174,7 @@ impl ProblemSpec {
         }
         let mut phase = Phase {
             name: "whole".to_owned(),
+            support: None,
             tasks: Vec::new(),
         };
         let mut tasks = Vec::new();

@@ -50,6 +50,7 @@ impl Fixture {
                 .collect(),
             phases: vec![Phase {
                 name: "all".into(),
+                support: None,
                 tasks: tasks
                     .iter()
                     .enumerate()

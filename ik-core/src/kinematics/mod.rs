@@ -2,14 +2,15 @@
 //!
 //! [`forward`] walks the tree once and fills a [`Page`]: the pose of every body, the centre of mass and its Jacobian.
 //! Because body frames are aligned so that each joint turns or slides along its body's z axis, the poses *are* the
-//! joint axes and origins, and frame Jacobians ([`jacobian`]), second-order terms ([`second_order`]) and gravity
-//! torques ([`gravity`]) and the screws of the joints ([`screws`]) need nothing else. Everything is expressed in the world
+//! joint axes and origins, and frame Jacobians ([`jacobian`]), second-order terms ([`second_order`]), gravity
+//! torques ([`gravity`], [`hanging`]) and the screws of the joints ([`screws`]) need nothing else. Everything is expressed in the world
 //! frame, SI units, radians. [`successive`] is a second, slower way to the same poses and axes.
 //!
 //! Velocity coordinates of a floating root: linear velocity of the root origin, then angular velocity, both in world
 //! axes (see [`crate::configuration`]).
 
 pub mod gravity;
+pub mod hanging;
 pub mod jacobian;
 pub mod screws;
 pub mod second_order;

@@ -34,6 +34,10 @@ pub const EMBEDDED: &[EmbeddedRobot] = &[
         summary: "Bioloid-type humanoid of point masses, free flyer and 18 revolute joints without limits, 1.7 kg",
     },
     EmbeddedRobot {
+        id: "melson",
+        summary: "Melson-type humanoid of point masses, free flyer and 19 revolute joints with a torso twist, 2.6 kg",
+    },
+    EmbeddedRobot {
         id: "hubo",
         summary: "Hubo humanoid by its D-H table, free flyer and 24 revolute joints, legs and arms of six, 55 kg",
     },
@@ -69,6 +73,7 @@ pub const EMBEDDED: &[EmbeddedRobot] = &[
 
 const COMAN: &str = include_str!("../../robots/coman.urdf");
 const BIOLOID: &str = include_str!("../../robots/bioloid.urdf");
+const MELSON: &str = include_str!("../../robots/melson.urdf");
 const HUBO: &str = include_str!("../../robots/hubo.urdf");
 const HOAP2: &str = include_str!("../../robots/hoap2.urdf");
 const HRP2: &str = include_str!("../../robots/hrp2.urdf");
@@ -109,6 +114,7 @@ pub fn embedded(id: &str) -> Result<Robot, RobotError> {
         "coman-legs" => straight_knee_limit(&coman_legs()?.renamed(id)),
         "coman-legs-hyperextension" => Ok(coman_legs()?.renamed(id)),
         "bioloid" => read(BIOLOID, "robots/bioloid.urdf", Root::Floating),
+        "melson" => read(MELSON, "robots/melson.urdf", Root::Floating),
         "hubo" => read(HUBO, "robots/hubo.urdf", Root::Floating),
         "hoap2" => read(HOAP2, "robots/hoap2.urdf", Root::Floating),
         "hrp2" => read(HRP2, "robots/hrp2.urdf", Root::Floating),

@@ -88,6 +88,7 @@ pub(crate) fn problem(
         }],
         phases: vec![Phase {
             name: "all".into(),
+            support: None,
             tasks: vec![(0, priority)],
         }],
         boundary: Boundary::None,

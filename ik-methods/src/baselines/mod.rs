@@ -285,6 +285,7 @@ mod tests {
                     .collect(),
                 phases: vec![Phase {
                     name: "all".into(),
+                    support: None,
                     tasks: tasks
                         .iter()
                         .enumerate()

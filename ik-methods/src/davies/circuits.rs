@@ -3,24 +3,15 @@
 //! Circuits are coupled by shared joints only, and by the root if it is free: with an imposed root and one task per limb
 //! the secondary matrix falls into one block per limb, which are solved one by one.
 
-use super::least_norm::{MOST_FREE, Ranks, Stage};
 use super::rows::Closing;
 use super::virtual_chain::Instant;
+use crate::least_norm::{DEPENDENT, DROP, DROP_AT_GENERIC_POSTURE, MOST_FREE, Ranks, Stage, fade};
 use ik_core::kinematics::{Page, forward};
 use ik_core::problem::{Phase, Problem};
 use ik_core::robot::Root;
 use ik_core::spatial::screw::Screw;
 use ik_core::task::{Priority, Track};
 use ik_core::weights::WeightFactor;
-
-/// Hard rows whose [`Stage::independence`] is below this are damped. It is never less than the inverse of the condition
-/// number, so that nothing is damped below one of 1e5; there a twist of 1 mm/s asks for some 1e2 rad/s.
-const DEPENDENT: f64 = 1e-5;
-/// Pivots below this part of the longest row have no number in them. The last direction of a nearly straight limb is
-/// damped, but never dropped before: with it dropped, the limb stays straight for good (bioloid/squat z190).
-const DROP: f64 = f64::EPSILON;
-/// The same at the postures at which ranks are counted: independent rows stay far above, rounding far below.
-const DROP_AT_GENERIC_POSTURE: f64 = 1e-9;
 
 /// Part of a task that closes one circuit: the task itself, or one joint of a posture.
 #[derive(Clone, Debug)]
@@ -94,13 +85,6 @@ pub(super) struct Damping {
     pub(super) soft: f64,
     /// Independence from which compromised rows are not damped.
     pub(super) soft_threshold: f64,
-}
-
-/// The part of its full value that a damping has at this independence; none from the threshold on (Nakamura & Hanafusa
-/// 1986), so that nothing is distorted away from singularities.
-fn fade(independence: f64, threshold: f64) -> f64 {
-    let near = independence / threshold;
-    (1.0 - near * near).max(0.0).sqrt()
 }
 
 /// What hard tasks impose on one group.
@@ -222,6 +206,11 @@ impl Circuits {
             page,
             instant,
         };
+        if let Some(rate) = at.secondary_rate() {
+            // Also of joints that no circuit touches.
+            let joints = v[problem.robot().root().nv()..].iter_mut();
+            joints.enumerate().for_each(|(j, v)| *v = rate(j));
+        }
         let root = self.imposed_root.map_or_else(Screw::default, |task| {
             let twist = at.root_twist(task);
             v[..3].copy_from_slice(twist.linear.as_slice());
@@ -390,6 +379,7 @@ impl Group {
         let (free, costed) = self.root.split(self.joints.len());
         let rows = self.stages[0].clear(free, costed);
         at.fill(&self.hard, self.root, root, place, rows);
+        at.lean(&self.joints, free + costed + 1, rows);
         self.stages[0].factorise(drop);
     }
 
@@ -397,6 +387,7 @@ impl Group {
     fn follow(&mut self, at: &Closing<'_>, root: &Screw, place: &[usize], drop: f64) {
         self.soft_rows.fill(0.0);
         at.fill(&self.soft, self.root, root, place, &mut self.soft_rows);
+        at.lean(&self.joints, self.unknowns() + 1, &mut self.soft_rows);
         let [hard, soft] = &mut self.stages;
         hard.follow(&mut self.soft_rows, soft);
         soft.factorise_followed(drop);
@@ -441,6 +432,11 @@ impl Group {
         let first = at.problem.robot().root().nv();
         for (&joint, rate) in self.joints.iter().zip(joints) {
             v[first + joint] = *rate;
+        }
+        if let Some(rate) = at.secondary_rate() {
+            self.joints
+                .iter()
+                .for_each(|&joint| v[first + joint] += rate(joint));
         }
         Quality {
             damped,

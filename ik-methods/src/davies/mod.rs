@@ -21,6 +21,9 @@
 //! (x⁺ − m)/Δt (for orientations to second order), the form of closed-loop inverse kinematics. 0 is the open loop, which
 //! drifts.
 //!
+//! Objectives of the problem: the least joint rates become those nearest to q̇₀ = −Σ γ ∇H (`secondary.rs`), in every block
+//! `q̇ = q̇₀ + A⁺ (y − A q̇₀)`, which projects q̇₀ into what the circuits leave free. Damped circuits give way to it.
+//!
 //! ## What it needs
 //! Targets; their rates if `feed_forward = "given"`. A hard pose of a frame on the root link imposes the root; otherwise the
 //! root is free and follows. Hard tasks must not impose more than the mobility, as a whole or on any limb. Where all tasks
@@ -48,7 +51,6 @@
 //! monitored coordinates too, which are no effort.
 
 mod circuits;
-mod least_norm;
 mod mechanism;
 mod network;
 mod rows;
@@ -59,7 +61,9 @@ pub use mechanism::{
 };
 pub use network::{Network, ReferencePoint};
 
+use crate::generic_posture::generic_postures;
 use crate::registry::{Allowed, Field, Method, MethodInfo, Parameters, Preset};
+use crate::secondary::Secondary;
 use crate::step_qp::stay;
 use circuits::{Circuits, Damping, RootChain};
 use ik_core::configuration::integrate_into;
@@ -286,6 +290,7 @@ impl Formulation for Davies {
             parameters: self.parameters.clone(),
             phases,
             page: Page::new(robot),
+            secondary: Secondary::new(problem),
             q: vec![0.0; robot.nq()],
             v: vec![0.0; robot.nv()],
             increment: vec![0.0; robot.nv()],
@@ -295,7 +300,7 @@ impl Formulation for Davies {
         let honours = Honours {
             boundary: false,
             hard_rows: false,
-            objective: Use::Ignored,
+            objective: Use::Projected,
             allocation_free: true,
             counts: Trust::Metered,
         };
@@ -315,6 +320,7 @@ struct DaviesStepper {
     parameters: DaviesParameters,
     phases: Vec<Circuits>,
     page: Page,
+    secondary: Secondary,
     q: Vec<f64>,
     v: Vec<f64>,
     /// Increment from q⁻ to the configuration of the next evaluation.
@@ -366,6 +372,7 @@ impl DaviesStepper {
         let robot = self.problem.robot();
         integrate_into(robot, step.q_prev, &self.increment, &mut self.q);
         eval.pass(&self.q, &mut self.page);
+        self.secondary.evaluate(eval, (&self.q, &self.page), step);
         let p = &self.parameters;
         if tau == 0.0 {
             let (measured, target) = ((&self.q[..], &self.page), step.targets.previous());
@@ -386,6 +393,7 @@ impl DaviesStepper {
             between: p.feed_forward,
             rates: p.orientation,
             corrections: &self.corrections,
+            secondary: self.secondary.increment(),
         };
         let damping = Damping {
             hard: p.damping,
@@ -406,15 +414,11 @@ impl DaviesStepper {
     }
 }
 
-/// Postures at which ranks are counted; the largest rank is the generic one.
-const GENERIC_POSTURES: usize = 3;
-
 /// Counts the ranks and compares what hard tasks impose with what the mechanism, and each group of circuits in it, can do.
 /// Remarks if they leave freedom.
 fn check_mobility(problem: &Problem, circuits: &mut Circuits) -> Result<Vec<String>, Declined> {
     let robot = problem.robot();
-    let postures: Vec<_> = (0..GENERIC_POSTURES).map(|k| generic_posture(robot, k)).collect();
-    circuits.count_ranks(problem, &postures);
+    circuits.count_ranks(problem, &generic_postures(robot));
     let name = |task: &usize| problem.tasks()[*task].name.clone();
     let groups = circuits.imposed();
     let fixed = circuits.imposed_root.map_or(0, |_| 6);
@@ -452,13 +456,4 @@ fn check_mobility(problem: &Problem, circuits: &mut Circuits) -> Result<Vec<Stri
         );
     }
     Ok(notes)
-}
-
-/// A posture without symmetry: multiples of the golden ratio, joints within ±1.
-fn generic_posture(robot: &ik_core::robot::Robot, k: usize) -> Vec<f64> {
-    const GOLDEN: f64 = 0.618_033_988_749_894_9;
-    #[allow(clippy::cast_precision_loss, reason = "small counts")]
-    let number = |i: usize| 2.0 * ((1 + i + 97 * k) as f64 * GOLDEN).fract() - 1.0;
-    let dq: Vec<f64> = (0..robot.nv()).map(number).collect();
-    ik_core::configuration::integrate(robot, &robot.neutral(), &dq)
 }

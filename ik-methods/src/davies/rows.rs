@@ -63,6 +63,24 @@ impl Closing<'_> {
         }
     }
 
+    /// Rate that objectives want of each joint coordinate, if they pull.
+    pub(super) fn secondary_rate(&self) -> Option<impl Fn(usize) -> f64> {
+        let first = self.problem.robot().root().nv();
+        let (increment, dt_s) = (self.instant.secondary?, self.instant.dt_s);
+        Some(move |joint: usize| increment[first + joint] / dt_s)
+    }
+
+    /// Takes the rates that objectives want of `joints` out of rows `[root | joints | imposed]` of that `width`: what is left
+    /// to solve for is the difference from them.
+    pub(super) fn lean(&self, joints: &[usize], width: usize, rows: &mut [f64]) {
+        let Some(rate) = self.secondary_rate() else { return };
+        for row in rows.chunks_exact_mut(width) {
+            let (unknowns, imposed) = row.split_at_mut(width - 1);
+            let columns = &unknowns[width - 1 - joints.len()..];
+            imposed[0] -= joints.iter().zip(columns).map(|(&j, c)| c * rate(j)).sum::<f64>();
+        }
+    }
+
     fn fill_circuit(
         &self,
         circuit: &Circuit,

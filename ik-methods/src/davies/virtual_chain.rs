@@ -45,6 +45,8 @@ pub(super) struct Instant<'a> {
     /// Correction rates `K (x − m)` of all tasks as [`closure_into`] wrote them at the beginning of the step. They are held
     /// during the step: measured anew at every evaluation they would only partly be made up for.
     pub(super) corrections: &'a [f64],
+    /// The secondary increment of the whole step (length nv), if objectives pull.
+    pub(super) secondary: Option<&'a [f64]>,
 }
 
 impl<'a> Instant<'a> {
@@ -57,6 +59,7 @@ impl<'a> Instant<'a> {
             between: Between::Line,
             rates: OrientationRates::AngularVelocity,
             corrections: &zeros[..problem.nxdot()],
+            secondary: None,
         }
     }
 
@@ -306,6 +309,7 @@ mod tests {
                 dt_s: 0.1,
                 tau,
                 corrections: &[],
+                secondary: None,
                 between: Between::Hermite,
                 rates: OrientationRates::AngularVelocity,
             };
@@ -334,6 +338,7 @@ mod tests {
                 dt_s: dt,
                 tau: 0.0,
                 corrections: &[],
+                secondary: None,
                 between: Between::Line,
                 rates,
             };

@@ -1,13 +1,14 @@
 //! The problem of the paper, shared by the integration tests.
 
 use ik_core::boundary::Boundary;
+use ik_core::objective::Objective;
 use ik_core::problem::{Kind, Phase, Problem, ProblemParts, Supplies};
 use ik_core::robot::embedded;
 use ik_core::task::{OrientationCoordinates, Priority, Task, Track, Weights};
 use std::sync::Arc;
 
-/// The legs of COMAN: centre of mass compromised with these weights, soles and torso hard, orientations as rpy.
-pub(crate) fn legs(boundary: Boundary, com_weights: Vec<f64>) -> Arc<Problem> {
+/// The legs of COMAN on the left foot: centre of mass compromised with these weights, soles and torso hard, orientations as rpy.
+pub(crate) fn legs(boundary: Boundary, com_weights: Vec<f64>, objectives: Vec<Objective>) -> Arc<Problem> {
     let robot = Arc::new(embedded("coman-legs").unwrap());
     let frame = |name: &str| robot.frame(name).unwrap();
     let tasks = [
@@ -31,6 +32,7 @@ pub(crate) fn legs(boundary: Boundary, com_weights: Vec<f64>) -> Arc<Problem> {
             .collect(),
         phases: vec![Phase {
             name: "all".into(),
+            support: Some(frame("l_sole")),
             tasks: tasks
                 .iter()
                 .enumerate()
@@ -38,7 +40,7 @@ pub(crate) fn legs(boundary: Boundary, com_weights: Vec<f64>) -> Arc<Problem> {
                 .collect(),
         }],
         boundary,
-        objectives: vec![],
+        objectives,
         kind: Kind::Tracking,
         supplies: Supplies {
             rates: true,

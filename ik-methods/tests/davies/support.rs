@@ -40,6 +40,7 @@ pub(crate) fn problem_in(
             .collect(),
         phases: vec![Phase {
             name: "whole".into(),
+            support: None,
             tasks: tasks
                 .iter()
                 .enumerate()

@@ -212,6 +212,7 @@ fn tasks_count_in_the_phases_they_belong_to() {
     let mut parts = parts(robot, tasks, Boundary::None);
     let phase = |name: &str, tasks| Phase {
         name: name.to_owned(),
+        support: None,
         tasks,
     };
     parts.phases = vec![

@@ -190,6 +190,7 @@ fn parts(robot: Robot, tasks: Vec<(&str, Track, Priority)>, boundary: Boundary) 
             .collect(),
         phases: vec![Phase {
             name: "only".to_owned(),
+            support: None,
             tasks: phase,
         }],
         boundary,

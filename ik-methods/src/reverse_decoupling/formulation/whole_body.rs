@@ -44,16 +44,14 @@ impl Merit {
         self.missing_m == 0.0 && self.outside.0 <= OUTSIDE_RAD
     }
 
-    /// What is missing first, then what is outside, then the centre of mass.
     pub(super) fn is_better_than(&self, other: &Self) -> bool {
-        if self.missing_m != other.missing_m {
-            return self.missing_m < other.missing_m;
-        }
-        let (outside, others) = (self.outside.0.max(OUTSIDE_RAD), other.outside.0.max(OUTSIDE_RAD));
-        if outside != others {
-            return outside < others;
-        }
-        self.away.norm_squared() < other.away.norm_squared()
+        self.rank() < other.rank()
+    }
+
+    /// What is missing first, then what is outside, then the centre of mass.
+    fn rank(&self) -> (f64, f64, f64) {
+        let outside = self.outside.0.max(OUTSIDE_RAD);
+        (self.missing_m, outside, self.away.norm_squared())
     }
 }
 

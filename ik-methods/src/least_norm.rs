@@ -17,29 +17,37 @@
 //!
 //! Rows are stored `[F | C | y]`, one after the other.
 
+/// Hard rows whose [`Stage::independence`] is below this are damped. It is never less than the inverse of the condition
+/// number, so that nothing is damped below one of 1e5; there a twist of 1 mm/s asks for some 1e2 rad/s.
+pub(crate) const DEPENDENT: f64 = 1e-5;
+/// Pivots below this part of the longest row have no number in them. The last direction of a nearly straight limb is
+/// damped, but never dropped before: with it dropped, the limb stays straight for good (bioloid/squat z190).
+pub(crate) const DROP: f64 = f64::EPSILON;
+/// The same at the postures at which ranks are counted: independent rows stay far above, rounding far below.
+pub(crate) const DROP_AT_GENERIC_POSTURE: f64 = 1e-9;
 /// Free columns below this part of the largest are dependent on the others: unknowns that the rows hardly see would take
 /// rates of a million times what is asked for.
 const FREE_DEPENDENT: f64 = 1e-6;
 /// Rows shorter than this (m, rad) are no rows: a frame on the axes that should move it, or a weight that weighs nothing.
 const SHORTEST: f64 = 1e-12;
 /// Free unknowns there can be: the six of a root.
-pub(super) const MOST_FREE: usize = 6;
+pub(crate) const MOST_FREE: usize = 6;
 
 /// Ranks of the two parts of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Ranks {
+pub(crate) struct Ranks {
     /// Of F.
-    pub(super) free: usize,
+    pub(crate) free: usize,
     /// Of C below F.
-    pub(super) costed: usize,
+    pub(crate) costed: usize,
 }
 
 impl Ranks {
     /// None at all.
-    pub(super) const NONE: Self = Self { free: 0, costed: 0 };
+    pub(crate) const NONE: Self = Self { free: 0, costed: 0 };
 
     /// The larger of each.
-    pub(super) fn max(self, other: Self) -> Self {
+    pub(crate) fn max(self, other: Self) -> Self {
         Self {
             free: self.free.max(other.free),
             costed: self.costed.max(other.costed),
@@ -49,7 +57,7 @@ impl Ranks {
 
 /// Rows of one priority and their factorisation. Sized once; nothing here allocates afterwards.
 #[derive(Clone, Debug)]
-pub(super) struct Stage {
+pub(crate) struct Stage {
     free: usize,
     costed: usize,
     width: usize,
@@ -77,7 +85,7 @@ pub(super) struct Stage {
 
 impl Stage {
     /// Room for `height` rows in `free` free and `costed` costed unknowns, whose ranks can be as large as that allows.
-    pub(super) fn new(height: usize, free: usize, costed: usize) -> Self {
+    pub(crate) fn new(height: usize, free: usize, costed: usize) -> Self {
         let width = free + costed + 1;
         let most = height.min(costed);
         Self {
@@ -103,32 +111,32 @@ impl Stage {
     }
 
     /// Sets the ranks the rows can have, known from postures without symmetry.
-    pub(super) fn cap(&mut self, most: Ranks) {
+    pub(crate) fn cap(&mut self, most: Ranks) {
         self.most = most;
     }
 
     /// Ranks the rows can have.
-    pub(super) fn most(&self) -> Ranks {
+    pub(crate) fn most(&self) -> Ranks {
         self.most
     }
 
     /// Ranks found by the last factorisation.
-    pub(super) fn found(&self) -> Ranks {
+    pub(crate) fn found(&self) -> Ranks {
         self.found
     }
 
     /// Whether there are rows at all.
-    pub(super) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.height == 0
     }
 
     /// Length of the longest row of C as it came in.
-    pub(super) fn row_scale(&self) -> f64 {
+    pub(crate) fn row_scale(&self) -> f64 {
         self.row_scale
     }
 
     /// Zeroes the rows and hands them out to be filled, `[F | C | y]` each.
-    pub(super) fn clear(&mut self, free: usize, costed: usize) -> &mut [f64] {
+    pub(crate) fn clear(&mut self, free: usize, costed: usize) -> &mut [f64] {
         (self.free, self.costed, self.width) = (free, costed, free + costed + 1);
         let rows = &mut self.rows[..self.height * self.width];
         rows.fill(0.0);
@@ -137,14 +145,14 @@ impl Stage {
 
     /// Factorises rows that were filled in by the caller. Rows of C whose pivot is below `drop` of the longest row are left
     /// out.
-    pub(super) fn factorise(&mut self, drop: f64) {
+    pub(crate) fn factorise(&mut self, drop: f64) {
         (self.free_scale, self.row_scale) =
             scales(&self.rows[..self.height * self.width], self.free, self.width);
         self.factorise_followed(drop);
     }
 
     /// Factorises rows that [`Stage::follow`] wrote, as [`Stage::factorise`] does.
-    pub(super) fn factorise_followed(&mut self, drop: f64) {
+    pub(crate) fn factorise_followed(&mut self, drop: f64) {
         self.eliminate_free();
         self.triangulate(drop);
     }
@@ -239,7 +247,7 @@ impl Stage {
     /// scale the length of its longest row as it came in. That is the harmonic mean square of the singular values over the
     /// scale: 1 for orthogonal rows of one length, continuous in the rows, between σ_min and √rank σ_min over the scale. 1
     /// without rows, 0 where a rank is less than it can be.
-    pub(super) fn independence(&mut self) -> f64 {
+    pub(crate) fn independence(&mut self) -> f64 {
         let (f, w, r) = (self.free, self.width, self.found.costed);
         let possible = self
             .most
@@ -269,7 +277,7 @@ impl Stage {
     }
 
     /// Decides what the stage decides, damped by λ; returns the Euclidean norm of what its rows then miss.
-    pub(super) fn decide(&mut self, damping: f64) -> f64 {
+    pub(crate) fn decide(&mut self, damping: f64) -> f64 {
         let (f, n, w, r) = (self.free, self.costed, self.width, self.found.costed);
         let (below, height) = (
             &self.rows[self.found.free * w..self.height * w],
@@ -335,13 +343,13 @@ impl Stage {
     }
 
     /// Unknowns that this stage leaves: free ones, costed ones.
-    pub(super) fn left(&self) -> (usize, usize) {
+    pub(crate) fn left(&self) -> (usize, usize) {
         (self.free - self.found.free, self.costed - self.found.costed)
     }
 
     /// Writes rows of the next priority, given in the unknowns of this stage (`[F | C | y]`, this stage's width), into
     /// `next` in the unknowns this stage leaves. The given rows are used up.
-    pub(super) fn follow(&self, rows: &mut [f64], next: &mut Self) {
+    pub(crate) fn follow(&self, rows: &mut [f64], next: &mut Self) {
         let (f, n, w, r) = (self.free, self.costed, self.width, self.found.costed);
         (next.free_scale, next.row_scale) = scales(rows, f, w);
         let (free, costed) = self.left();
@@ -380,7 +388,7 @@ impl Stage {
     }
 
     /// Writes u and x; on entry they hold, in front, what the stages after this one decided of what it left.
-    pub(super) fn finish(&self, u: &mut [f64], x: &mut [f64]) {
+    pub(crate) fn finish(&self, u: &mut [f64], x: &mut [f64]) {
         let (f, n, w, r) = (self.free, self.costed, self.width, self.found.costed);
         x.copy_within(..n - r, r);
         x[..r].copy_from_slice(&self.decided[..r]);
@@ -404,6 +412,13 @@ impl Stage {
             u[column] = value;
         }
     }
+}
+
+/// The part of its full value that a damping has at this independence; none from the threshold on (Nakamura & Hanafusa
+/// 1986), so that nothing is distorted away from singularities.
+pub(crate) fn fade(independence: f64, threshold: f64) -> f64 {
+    let near = independence / threshold;
+    (1.0 - near * near).max(0.0).sqrt()
 }
 
 /// Length of the longest column of F and of the longest row of C of rows `[F | C | y]`.
