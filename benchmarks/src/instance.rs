@@ -282,6 +282,9 @@ fn detail(termination: &Termination) -> String {
             format!("the hard rows were damped; {residual} of them (m, rad) is left")
         }
         Termination::OutOfReach { missing_m } => format!("the target is {missing_m} m out of reach"),
+        Termination::OutsideLimits { joint, excess } => {
+            format!("every solution is outside the limits, the best by {excess} (rad or m) in joint {joint}")
+        }
         Termination::Numerical(reason) => (*reason).to_owned(),
         Termination::Failed(failure) => format!("{failure:?}"),
         Termination::Converged | Termination::Stepped | Termination::Budget => String::new(),

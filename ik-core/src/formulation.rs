@@ -135,6 +135,14 @@ pub enum Termination {
         /// Missing distance (m).
         missing_m: f64,
     },
+    /// Every solution of a limb is outside the interval of a joint: the robot moves to the one that is least outside as far
+    /// as the intervals allow, and hard rows are missed.
+    OutsideLimits {
+        /// Index of the joint coordinate that is furthest outside.
+        joint: usize,
+        /// By how much (rad or m).
+        excess: f64,
+    },
     /// Arithmetic broke down; q is the previous configuration.
     Numerical(&'static str),
     /// A method outside this process failed.
@@ -164,6 +172,7 @@ impl Termination {
             Self::HardRowsRelaxed { .. } => "hard-rows-relaxed",
             Self::Damped { .. } => "damped",
             Self::OutOfReach { .. } => "out-of-reach",
+            Self::OutsideLimits { .. } => "outside-limits",
             Self::Numerical(_) => "numerical",
             Self::Failed(_) => "failed",
         }

@@ -8,6 +8,7 @@ use crate::direct_position::DirectPosition;
 use crate::error_integration::ErrorIntegration;
 use crate::gauss_newton::GaussNewton;
 use crate::null_space_clik::NullSpaceClik;
+use crate::reverse_decoupling::formulation::ReverseDecoupling;
 use crate::two_slack::TwoSlack;
 use ik_core::formulation::Formulation;
 use serde::Serialize;
@@ -25,6 +26,7 @@ pub static METHODS: &[Entry] = &[
     entry::<TwoSlack>(),
     entry::<Davies>(),
     preset::<Davies>(davies::OPEN_LOOP),
+    entry::<ReverseDecoupling>(),
     entry::<NullSpaceClik>(),
     entry::<PenaltyCg>(),
     entry::<PenaltyLbfgs>(),

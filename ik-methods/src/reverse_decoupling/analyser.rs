@@ -21,8 +21,9 @@ pub use denavit_hartenberg::{DenavitHartenberg, DhRow};
 use denavit_hartenberg::{Triple, rows};
 use ik_core::kinematics::successive::{JointLine, ZeroPose};
 use ik_core::robot::{FrameId, Motion, Robot};
-use lines::{distance, meeting, sine};
-use nalgebra::Isometry3;
+pub(super) use lines::meeting;
+use lines::{distance, sine};
+use nalgebra::{Isometry3, Point3, Vector3};
 use std::f64::consts::PI;
 
 /// Axes with a miss up to this (m) meet. Demanded of the analyser; robots whose description is rounded to six decimals
@@ -212,10 +213,36 @@ pub fn denavit_hartenberg(robot: &Robot, limb: &LimbReport) -> Result<DenavitHar
             robot: robot.name().to_owned(),
         });
     }
-    let (lines, tip) = at_zero(robot, &limb.joints);
+    let (lines, tip) = limb_axes(robot, &limb.joints);
     let triple = triple(&lines, family.triple());
     let plain = rows(&lines, &vec![1.0; lines.len()], triple, &tip);
     Ok(rows(&lines, &signs(&plain, family), triple, &tip))
+}
+
+/// Rows of a limb of three joints with three more axes through `point` (m, in the last body), along the axes of that body: a
+/// virtual wrist, with which placing the point becomes a pose. None if a joint slides or follows another.
+pub(super) fn with_virtual_wrist(
+    robot: &Robot,
+    limb: &LimbReport,
+    point: &Point3<f64>,
+) -> Option<DenavitHartenberg> {
+    if limb.joints.len() != 3 || unfit_joint(robot, &limb.joints).is_some() {
+        return None;
+    }
+    let (mut lines, tip) = limb_axes(robot, &limb.joints);
+    let point = tip * point;
+    let wrist = Isometry3::from_parts(point.coords.into(), tip.rotation);
+    for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
+        lines.push(JointLine {
+            axis: tip.rotation * axis,
+            point: point.coords,
+        });
+    }
+    let triple = Triple {
+        first: 3,
+        point: point.coords,
+    };
+    Some(rows(&lines, &[1.0; JOINTS], triple, &wrist))
 }
 
 /// Joints from the last branching body, or the root, to `tip`.
@@ -253,7 +280,7 @@ fn report(robot: &Robot, zero: &ZeroPose<'_>, joints: Vec<usize>, tip: usize) ->
 }
 
 /// Axes of a chain and pose of its last body, at the zero pose, in the body that carries it.
-fn at_zero(robot: &Robot, joints: &[usize]) -> (Vec<JointLine>, Isometry3<f64>) {
+pub(super) fn limb_axes(robot: &Robot, joints: &[usize]) -> (Vec<JointLine>, Isometry3<f64>) {
     let mut pose = Isometry3::identity();
     let mut lines = Vec::with_capacity(joints.len());
     for &joint in joints {
@@ -271,7 +298,7 @@ fn closed_form(robot: &Robot, joints: &[usize]) -> Result<Family, Reason> {
     if let Some(reason) = unfit_joint(robot, joints) {
         return Err(reason);
     }
-    let (lines, tip) = at_zero(robot, joints);
+    let (lines, tip) = limb_axes(robot, joints);
     let name = |i: usize| robot.joints()[joints[i]].name.clone();
     match lines.len() {
         4 if is_four_joint_arm(&lines, &tip) => return Ok(Family::FourJointArm),

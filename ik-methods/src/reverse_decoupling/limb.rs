@@ -1,11 +1,13 @@
 //! A limb of a robot with its closed form: the analyser's rows bound to the solver of their family, in joint values of the
 //! robot and poses of its bodies.
 
-use super::analyser::{Family, LimbReport, NoRows, denavit_hartenberg};
+use super::analyser::{
+    DenavitHartenberg, DhRow, Family, LimbReport, NoRows, denavit_hartenberg, with_virtual_wrist,
+};
 use super::general::{self, GeneralLimb, Outcome};
 use super::{Arm, ElbowArm, Leg, LimbPose, Solutions, Unsolved, wrap};
 use ik_core::robot::Robot;
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Most joints a limb with a closed form has.
@@ -21,6 +23,8 @@ pub struct Limb {
     tool_inverse: Isometry3<f64>,
     /// θ = sign q + offset, per joint.
     angles: Vec<(f64, f64)>,
+    /// Joints that are the robot's; the others are those of a virtual wrist.
+    joints: usize,
 }
 
 #[derive(Clone, Debug)]
@@ -37,6 +41,9 @@ pub enum Unbound {
     /// It has no closed form, or is not of this robot.
     #[error(transparent)]
     NoRows(#[from] NoRows),
+    /// To place a point it needs three revolute joints of its own; name of its last body.
+    #[error("limb at `{0}`: only three revolute, independent joints place a point in closed form")]
+    NotThree(String),
     /// The general solver does not take its rows.
     #[error("limb at `{tip}`: {source}")]
     Rows {
@@ -85,31 +92,40 @@ impl Limb {
                     },
                 })
             }
-            Family::General { .. } => {
-                let row = |k: usize| general::DhRow {
-                    alpha: rows[k].alpha,
-                    a: rows[k].a,
-                    d: rows[k].d,
-                };
-                let general = GeneralLimb::new(std::array::from_fn(row));
-                let general = general.map_err(|source| Unbound::Rows {
-                    tip: report.tip_name.clone(),
-                    source,
-                })?;
-                Solver::General(Box::new(general))
-            }
+            Family::General { .. } => general_solver(rows, report)?,
         };
+        Ok(Self::bound(solver, &table, tool))
+    }
+
+    /// The solver of a limb of three joints that place `point` (m, in the last body): a limb of six with a virtual wrist in
+    /// the point. Our extension; the paper has no such limb.
+    ///
+    /// # Errors
+    /// Another number of joints, joints that slide or follow others, axes that leave the point in a plane or on a sphere.
+    pub fn placing(robot: &Robot, report: &LimbReport, point: &Point3<f64>) -> Result<Self, Unbound> {
+        let Some(table) = with_virtual_wrist(robot, report, point) else {
+            return Err(Unbound::NotThree(report.tip_name.clone()));
+        };
+        let solver = general_solver(&table.rows, report)?;
         Ok(Self {
+            joints: report.joints.len(),
+            ..Self::bound(solver, &table, table.tool)
+        })
+    }
+
+    fn bound(solver: Solver, table: &DenavitHartenberg, tool: Isometry3<f64>) -> Self {
+        Self {
             solver,
             base_inverse: table.base.inverse(),
             tool_inverse: tool.inverse(),
-            angles: rows.iter().map(|row| (row.sign, row.offset)).collect(),
-        })
+            angles: table.rows.iter().map(|row| (row.sign, row.offset)).collect(),
+            joints: table.rows.len(),
+        }
     }
 
     /// Number of joints.
     pub fn joints(&self) -> usize {
-        self.angles.len()
+        self.joints
     }
 
     /// Calls `found` with the joint values (rad, base to tip, each in (−π, π]) of every solution and its branch number, for
@@ -134,34 +150,40 @@ impl Limb {
         for ((to, q), (sign, offset)) in before.iter_mut().zip(previous).zip(&self.angles) {
             *to = sign * q + offset;
         }
+        let mut last: Option<[f64; MOST_JOINTS]> = None;
+        let mut count = 0;
         let mut give = |angles: &[f64], branch: u8| {
             let mut q = [0.0; MOST_JOINTS];
             for ((q, theta), (sign, offset)) in q.iter_mut().zip(angles).zip(&self.angles) {
                 *q = wrap(sign * (theta - offset));
             }
-            found(&q[..angles.len()], branch);
+            // Both turns of a virtual wrist come one after the other and are one solution.
+            q[self.joints..].fill(0.0);
+            if self.joints == self.angles.len() || last != Some(q) {
+                found(&q[..self.joints], branch);
+                count += 1;
+            }
+            last = Some(q);
         };
         match &self.solver {
             Solver::Leg(leg) => {
                 let mut all = Solutions::default();
                 leg.solve_all(&pose, &before, &mut all)?;
                 all.iter().for_each(|(angles, branch)| give(angles, branch));
-                Ok(all.len())
             }
             Solver::Arm(arm) => {
                 let mut all = Solutions::default();
                 arm.solve_all(&pose, &before, &mut all)?;
                 all.iter().for_each(|(angles, branch)| give(angles, branch));
-                Ok(all.len())
             }
             Solver::ElbowArm(arm) => {
                 let mut all = Solutions::default();
                 arm.solve_all(&pose, &[before[0], before[1], before[2], before[3]], &mut all)?;
                 all.iter().for_each(|(angles, branch)| give(angles, branch));
-                Ok(all.len())
             }
-            Solver::General(general) => general_solutions(general, &pose, &before, give),
+            Solver::General(general) => general_solutions(general, &pose, &before, give)?,
         }
+        Ok(count)
     }
 
     /// Writes the solution whose largest difference from `previous` is least.
@@ -187,20 +209,33 @@ impl Limb {
     }
 }
 
+fn general_solver(rows: &[DhRow], report: &LimbReport) -> Result<Solver, Unbound> {
+    let row = |k: usize| general::DhRow {
+        alpha: rows[k].alpha,
+        a: rows[k].a,
+        d: rows[k].d,
+    };
+    let general = GeneralLimb::new(std::array::from_fn(row)).map_err(|source| Unbound::Rows {
+        tip: report.tip_name.clone(),
+        source,
+    })?;
+    Ok(Solver::General(Box::new(general)))
+}
+
 fn general_solutions(
     general: &GeneralLimb,
     pose: &LimbPose,
     before: &[f64; MOST_JOINTS],
     mut give: impl FnMut(&[f64], u8),
-) -> Result<usize, Unsolved> {
+) -> Result<(), Unsolved> {
     pose.check()?;
     let mut all = general::Solutions::default();
     match general.solve_into(&pose.rotation, &pose.position, before, &mut all) {
-        Outcome::Solved(count) => {
+        Outcome::Solved(_) => {
             for (angles, number) in all.as_slice().iter().zip(0..) {
                 give(angles, number);
             }
-            Ok(count)
+            Ok(())
         }
         Outcome::OutOfReach { excess_m } => Err(Unsolved::General { excess_m }),
     }

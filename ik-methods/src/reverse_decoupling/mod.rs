@@ -14,6 +14,7 @@
 
 pub mod analyser;
 mod arm;
+pub mod formulation;
 pub mod general;
 mod leg;
 mod limb;

@@ -56,7 +56,7 @@ fn descend(fixture: &Fixture, (id, parameters): (&str, &str), gains: &[f64], ste
     }
 }
 
-/// Jacobian and error of all tasks.
+/// Jacobian and error of all tasks, hard ones first.
 fn rows(fixture: &Fixture, q: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
     let problem = &fixture.problem;
     let mut lin = Linearisation::new(problem);
@@ -161,6 +161,31 @@ fn compromised_tasks_come_before_objectives() {
             end.error < allowed && found < apart,
             "{method:?}: {:e} {found:e}",
             end.error
+        );
+    }
+}
+
+#[test]
+fn claimed_multipliers_count_the_pull_of_objectives() {
+    let fixture = melson("l_foot", |parts| {
+        parts.phases[0].tasks[4].1 = Priority::Compromised(Weights::Uniform(4.0));
+    });
+    for id in ["ik4", "ik5"] {
+        let mut driver = fixture.driver(id, "");
+        fixture.step(&mut driver, &fixture.start, &fixture.target, &[1.0, 1.0]);
+        let solution = driver.solution();
+        assert!(solution.claim.has, "{id}");
+        let (jacobian, error) = rows(&fixture, &solution.q);
+        let hard = solution.claim.hard.len();
+        let (of_hard, of_soft) = (jacobian.rows(0, hard), jacobian.rows(hard, error.len() - hard));
+        let balance = of_soft.tr_mul(&error.rows(hard, error.len() - hard))
+            + DVector::from_column_slice(&solution.claim.own)
+            - of_hard.tr_mul(&DVector::from_column_slice(&solution.claim.hard));
+        let own = DVector::from_column_slice(&solution.claim.own).amax();
+        assert!(
+            own > 1e-9 && balance.amax() < 1e-6 * own,
+            "{id}: {:e} {own:e}",
+            balance.amax()
         );
     }
 }

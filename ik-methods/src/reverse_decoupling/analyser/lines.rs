@@ -10,15 +10,15 @@ const PARALLEL_SINGULAR_VALUE: f64 = 1e-12;
 
 /// The point nearest to some lines in the least-squares sense.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Meeting {
+pub(in crate::reverse_decoupling) struct Meeting {
     /// The point (m).
-    pub(super) point: Vector3<f64>,
+    pub(in crate::reverse_decoupling) point: Vector3<f64>,
     /// Greatest distance from it to one of the lines (m).
-    pub(super) miss_m: f64,
+    pub(in crate::reverse_decoupling) miss_m: f64,
 }
 
 /// Least squares over the distances: `Σ (1 − s sᵀ)(x − p) = 0`.
-pub(super) fn meeting(lines: &[JointLine]) -> Meeting {
+pub(in crate::reverse_decoupling) fn meeting(lines: &[JointLine]) -> Meeting {
     let across = |line: &JointLine| Matrix3::identity() - line.axis * line.axis.transpose();
     // Relative to the mean of the points, so that the least-norm solution for parallel lines is near them.
     let mean = lines.iter().map(|line| line.point).sum::<Vector3<f64>>() / lines.len() as f64;

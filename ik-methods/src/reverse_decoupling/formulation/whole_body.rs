@@ -1,0 +1,291 @@
+//! A configuration of the whole robot, limb by limb, for a position of the waist, and how good it is.
+
+use super::plan::{LimbPlan, Plan, Target, Waist};
+use super::region::Region;
+use crate::reverse_decoupling::{Unsolved, wrap};
+use ik_core::evaluator::Evaluator;
+use ik_core::formulation::Termination;
+use ik_core::kinematics::Page;
+use ik_core::robot::{Robot, Root};
+use ik_core::step::{Bounds, ControlStep};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use std::f64::consts::TAU;
+
+/// Joints this far (rad) outside their interval are within rounding of it and clamped.
+pub(super) const OUTSIDE_RAD: f64 = 1e-9;
+/// q⁻ within this (m, rad) of all targets is the answer: beyond rounding, a closed form at a double root is not better.
+const THERE: f64 = 1e-13;
+
+/// A configuration with the root at `origin`.
+#[derive(Debug)]
+pub(super) struct Candidate {
+    pub(super) origin: Vector3<f64>,
+    pub(super) q: Vec<f64>,
+    pub(super) page: Page,
+    pub(super) merit: Merit,
+}
+
+/// How good a candidate is.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Merit {
+    /// What hard limbs miss (m): if any, there is no configuration.
+    pub(super) missing_m: f64,
+    /// What compromised limbs miss (m): they rest.
+    pub(super) left_m: f64,
+    /// Greatest excess over an interval (rad), and the joint coordinate.
+    pub(super) outside: (f64, usize),
+    /// From the target of the centre of mass (m).
+    pub(super) away: Vector3<f64>,
+}
+
+impl Merit {
+    /// Whether hard limbs reach and all joints are inside.
+    pub(super) fn stands(&self) -> bool {
+        self.missing_m == 0.0 && self.outside.0 <= OUTSIDE_RAD
+    }
+
+    pub(super) fn is_better_than(&self, other: &Self) -> bool {
+        self.rank() < other.rank()
+    }
+
+    /// What is missing first, then what is outside, then the centre of mass.
+    fn rank(&self) -> (f64, f64, f64) {
+        let outside = self.outside.0.max(OUTSIDE_RAD);
+        (self.missing_m, outside, self.away.norm_squared())
+    }
+}
+
+impl Candidate {
+    fn new(robot: &Robot) -> Self {
+        Self {
+            origin: Vector3::zeros(),
+            q: robot.neutral(),
+            page: Page::new(robot),
+            merit: Merit::default(),
+        }
+    }
+}
+
+/// Room for one step; sized once.
+#[derive(Debug)]
+pub(super) struct Work {
+    /// Pose of the last body of each limb in the world.
+    pub(super) targets: Vec<Isometry3<f64>>,
+    pub(super) region: Region,
+    pub(super) trial: Candidate,
+    pub(super) best: Candidate,
+}
+
+impl Work {
+    pub(super) fn new(robot: &Robot, limbs: usize) -> Self {
+        Self {
+            targets: vec![Isometry3::identity(); limbs],
+            region: Region::new(limbs),
+            trial: Candidate::new(robot),
+            best: Candidate::new(robot),
+        }
+    }
+}
+
+/// What stays the same while one step is solved.
+pub(super) struct Step<'a> {
+    pub(super) robot: &'a Robot,
+    pub(super) plan: &'a Plan,
+    pub(super) step: &'a ControlStep<'a>,
+    pub(super) x: &'a [f64],
+    pub(super) rotation: UnitQuaternion<f64>,
+}
+
+impl<'a> Step<'a> {
+    pub(super) fn new(robot: &'a Robot, plan: &'a Plan, step: &'a ControlStep<'a>) -> Self {
+        let x = step.targets.now().x;
+        let rotation = match plan.waist {
+            Waist::Fixed => UnitQuaternion::identity(),
+            Waist::Prescribed(attitude, _) | Waist::Balanced(attitude, _) => attitude.of_body(x),
+        };
+        Self {
+            robot,
+            plan,
+            step,
+            x,
+            rotation,
+        }
+    }
+
+    /// The best configuration, as `work.best`, and how it ends.
+    pub(super) fn solve(&self, work: &mut Work, eval: &mut Evaluator) -> Termination {
+        for (target, limb) in work.targets.iter_mut().zip(&self.plan.limbs) {
+            *target = limb.target.pose(self.x);
+        }
+        eval.pass(self.step.q_prev, &mut work.best.page);
+        let centre = match self.plan.waist {
+            Waist::Balanced(_, slot) => Some(Vector3::new(self.x[slot], self.x[slot + 1], self.x[slot + 2])),
+            Waist::Fixed | Waist::Prescribed(..) => None,
+        };
+        if self.is_there(&work.best.page, &work.targets, centre) {
+            work.best.q.copy_from_slice(self.step.q_prev);
+            work.best.merit = Merit::default();
+            return Termination::Converged;
+        }
+        let Some(centre) = centre else {
+            let origin = match self.plan.waist {
+                Waist::Prescribed(_, place) => place.point(self.x) - self.rotation * place.in_body.coords,
+                Waist::Fixed | Waist::Balanced(..) => Vector3::zeros(),
+            };
+            self.limbs(origin, &work.targets, &mut work.best);
+            return conclude(&work.best.merit);
+        };
+        self.balance(&centre, work, eval)
+    }
+
+    /// Whether q⁻ meets all targets and may stay.
+    fn is_there(&self, page: &Page, targets: &[Isometry3<f64>], centre: Option<Vector3<f64>>) -> bool {
+        let Bounds { lo, hi, .. } = self.step.bounds;
+        let may_stay = lo.iter().zip(hi).all(|(lo, hi)| *lo <= 0.0 && *hi >= 0.0);
+        let near = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
+            (a.translation.vector - b.translation.vector).amax() <= THERE
+                && a.rotation.angle_to(&b.rotation) <= THERE
+        };
+        let root = root_pose(self.robot, self.step.q_prev);
+        let root_is_there = match self.plan.waist {
+            Waist::Fixed => true,
+            Waist::Prescribed(_, place) => {
+                let origin = place.point(self.x) - self.rotation * place.in_body.coords;
+                near(&root, &Isometry3::from_parts(origin.into(), self.rotation))
+            }
+            Waist::Balanced(..) => root.rotation.angle_to(&self.rotation) <= THERE,
+        };
+        let limb_is_there = |(plan, target): (&LimbPlan, &Isometry3<f64>)| {
+            let body = plan.tip_pose(self.robot, page);
+            match plan.target {
+                Target::Pose(..) => near(&body, target),
+                Target::Point(place) => {
+                    ((body * place.in_body).coords - target.translation.vector).amax() <= THERE
+                }
+            }
+        };
+        may_stay
+            && root_is_there
+            && centre.is_none_or(|centre| (centre - page.centre_of_mass()).amax() <= THERE)
+            && self.plan.limbs.iter().zip(targets).all(limb_is_there)
+    }
+
+    /// Solves all limbs with the root at `origin`.
+    pub(super) fn limbs(&self, origin: Vector3<f64>, targets: &[Isometry3<f64>], out: &mut Candidate) {
+        out.origin = origin;
+        out.merit = Merit::default();
+        out.q.copy_from_slice(self.step.q_prev);
+        if self.robot.root() == Root::Floating {
+            out.q[..3].copy_from_slice(origin.as_slice());
+            let quaternion = self.rotation.coords;
+            let before = &self.step.q_prev[3..7];
+            let same_side = quaternion.iter().zip(before).map(|(a, b)| a * b).sum::<f64>() >= 0.0;
+            for (to, c) in out.q[3..7].iter_mut().zip(quaternion.iter()) {
+                *to = if same_side { *c } else { -c };
+            }
+        }
+        let root = Isometry3::from_parts(Translation3::from(origin), self.rotation);
+        for (plan, target) in self.plan.limbs.iter().zip(targets) {
+            self.limb(plan, &root.inv_mul(target), out);
+        }
+    }
+
+    /// Solves one limb for the pose of its last body in the root.
+    fn limb(&self, plan: &LimbPlan, pose: &Isometry3<f64>, out: &mut Candidate) {
+        let root = self.robot.root();
+        let (q_prev, bounds) = (&self.step.q_prev[root.nq()..], &self.step.bounds);
+        let mut before = [0.0; 6];
+        for (to, c) in before.iter_mut().zip(&plan.coordinates) {
+            *to = q_prev[*c];
+        }
+        let before = &before[..plan.coordinates.len()];
+        let (mut least, mut chosen) = ((f64::INFINITY, f64::INFINITY), (0.0, 0));
+        let joints = &mut out.q[root.nq()..];
+        let solved = plan.limb.for_each_solution(pose, before, |solution, _| {
+            let (mut moves, mut outside, mut most) = ([0.0; 6], (0.0, 0), 0.0_f64);
+            for (((to, q), before), c) in moves.iter_mut().zip(solution).zip(before).zip(&plan.coordinates) {
+                let (lo, hi) = (bounds.lo[root.nv() + c], bounds.hi[root.nv() + c]);
+                let (motion, excess) = turned_inside(wrap(q - before), lo, hi);
+                *to = motion;
+                most = most.max(motion.abs());
+                if excess > outside.0 {
+                    outside = (excess, *c);
+                }
+            }
+            let rank = (outside.0.max(OUTSIDE_RAD), most);
+            if rank < least {
+                (least, chosen) = (rank, outside);
+                for ((c, before), motion) in plan.coordinates.iter().zip(before).zip(moves) {
+                    joints[*c] = before + motion;
+                }
+            }
+        });
+        match solved {
+            Ok(_) if chosen.0 > out.merit.outside.0 => out.merit.outside = chosen,
+            Ok(_) => {}
+            Err(unsolved) if plan.is_hard => {
+                out.merit.missing_m = out.merit.missing_m.max(missing(&unsolved))
+            }
+            Err(unsolved) => out.merit.left_m = out.merit.left_m.max(missing(&unsolved)),
+        }
+    }
+}
+
+/// How the step of a candidate ends whose centre of mass, if it has one, is met.
+pub(super) fn conclude(merit: &Merit) -> Termination {
+    let missing_m = merit.missing_m.max(merit.left_m);
+    if merit.missing_m > 0.0 || (merit.stands() && merit.left_m > 0.0) {
+        Termination::OutOfReach { missing_m }
+    } else if !merit.stands() {
+        Termination::OutsideLimits {
+            joint: merit.outside.1,
+            excess: merit.outside.0,
+        }
+    } else {
+        Termination::Converged
+    }
+}
+
+/// What is missing of a pose (m): never zero.
+fn missing(unsolved: &Unsolved) -> f64 {
+    let missing = match unsolved {
+        Unsolved::Distance {
+            distance_m,
+            least_m,
+            largest_m,
+        } => (distance_m - largest_m).max(least_m - distance_m),
+        Unsolved::Orientation { found_m, largest_m } => found_m - largest_m,
+        Unsolved::General { excess_m } => excess_m.unwrap_or(f64::INFINITY),
+        Unsolved::OffSet { position_m, .. } => *position_m,
+        Unsolved::NotRigid { defect } => *defect,
+    };
+    missing.max(f64::MIN_POSITIVE)
+}
+
+/// The motion among those that differ by whole turns that is least outside an interval, and by how much.
+fn turned_inside(motion: f64, lo: f64, hi: f64) -> (f64, f64) {
+    let excess = |motion: f64| (lo - motion).max(motion - hi).max(0.0);
+    let mut best = (motion, excess(motion));
+    if best.1 > 0.0 {
+        for other in [motion - TAU, motion + TAU] {
+            if excess(other) < best.1 {
+                best = (other, excess(other));
+            }
+        }
+    }
+    best
+}
+
+/// Pose of the root body.
+pub(super) fn root_pose(robot: &Robot, q: &[f64]) -> Isometry3<f64> {
+    match robot.root() {
+        Root::Fixed => Isometry3::identity(),
+        Root::Floating => {
+            let turn = Quaternion::new(q[6], q[3], q[4], q[5]);
+            Isometry3::from_parts(
+                Translation3::new(q[0], q[1], q[2]),
+                UnitQuaternion::new_unchecked(turn),
+            )
+        }
+    }
+}
