@@ -1,0 +1,52 @@
+//! Figure 10: the right hip roll over thirty steps, and what the joints change from cycle to cycle.
+
+use super::super::axis::Axis;
+use super::super::figure::{Figure, PanelRow};
+use super::super::panel::{Markers, Panel, time_axis};
+use super::super::style::Marker;
+use super::super::walked::{Walked, line};
+use super::super::{Obstacle, Points, Studio};
+use super::{LONG, SCENARIOS, Shown, place_of, scenarios};
+
+const MARKERS: [Marker; SCENARIOS.len()] = [Marker::Circle, Marker::Square, Marker::Triangle];
+
+/// Figure 10.
+pub(in super::super) fn drift(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
+    let shown = scenarios(studio, LONG)?;
+    let mut hip = Panel::new("Fig. 10", time_axis(), Axis::linear("right hip roll (rad)"));
+    let mut change = Panel::new("", time_axis(), Axis::log("largest change in a cycle (rad)"));
+    for (Shown { scenario, walked }, marker) in shown.iter().zip(MARKERS) {
+        let points = walked.over_time("r_hip_roll")?;
+        hip.curves.push(line(scenario.name, points, scenario.style, 1.5));
+        let mut curve = line(scenario.name, changes(walked), scenario.style, 1.5);
+        curve.style.marker = marker;
+        curve.markers = Markers::Every;
+        change.curves.push(curve);
+    }
+    let rows = [(hip, 330.0), (change, 300.0)].map(|(panel, height)| PanelRow::new(height, vec![panel]));
+    let title = format!("Fig. 10  Drift over 30 steps: {}", place_of(&shown));
+    let remark = "A cycle is two steps, 10 s, after which feet, hands and centre of mass are where they were beside each other. \
+                  Its change is that of the joint that changes most.";
+    Ok(Figure::new(title, rows.to_vec())
+        .with_remarks(vec![remark.to_owned()])
+        .render()?)
+}
+
+/// At the end of each cycle (s), the largest change of a joint since the end of the one before (rad).
+fn changes(walked: &Walked<'_>) -> Points {
+    let times = walked.times();
+    let nearest = |end: f64| {
+        let apart = |k: &usize| (times[*k] - end).abs();
+        (0..times.len()).min_by(|a, b| apart(a).total_cmp(&apart(b)))
+    };
+    let walk = walked.case.trajectory.walk();
+    let ends = walk.map_or(Vec::new(), |walk| walk.plan.cycle_ends_s());
+    let ends: Vec<usize> = ends.into_iter().filter_map(nearest).collect();
+    let first = walked.case.problem.robot().root().nq();
+    let change = |pair: &[usize]| {
+        let joints = walked.q[pair[0]][first..].iter().zip(&walked.q[pair[1]][first..]);
+        let largest = joints.map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
+        (times[pair[1]], largest)
+    };
+    ends.windows(2).map(change).collect()
+}
