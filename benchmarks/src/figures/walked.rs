@@ -114,10 +114,10 @@ impl Walked<'_> {
         bands
     }
 
-    /// Limbs to the hands and soles.
+    /// Limbs to the hands and soles, sides as at the start.
     pub(super) fn skeleton(&self) -> Skeleton {
         let robot = self.case.problem.robot();
-        let mut skeleton = Skeleton::new(robot);
+        let mut skeleton = Skeleton::new(robot, &self.case.q_start);
         for hand in ["r_hand", "l_hand"] {
             skeleton.end(robot, hand);
         }

@@ -10,7 +10,7 @@ use super::{SHORT, Shown, in_single_support, place_of, scenarios};
 /// H_joint at all times and H_grav where it has a meaning.
 pub(in super::super) fn objectives(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
     let shown = scenarios(studio, SHORT)?;
-    let mut centring = Panel::new("eq. (12)", time_axis(), Axis::linear("H_joint"));
+    let mut centring = Panel::new("eq. (12)", time_axis(), Axis::linear("H_joint (–)"));
     let mut gravity = Panel::new("eq. (13)", time_axis(), Axis::linear("H_grav (N²m²)"));
     for Shown { scenario, walked } in &shown {
         let points = walked.over_time("objective_joint-centring")?;

@@ -4,12 +4,12 @@ use super::super::axis::Axis;
 use super::super::figure::{Figure, PanelRow};
 use super::super::panel::{Aspect, Level, Panel};
 use super::super::skeleton::View;
-use super::super::style::{Dash, GREY, Style};
+use super::super::style::{Dash, PURPLE, Style};
 use super::super::walked::plain;
 use super::super::{Obstacle, Studio};
 use super::{LONG, Shown, place_of, scenarios};
 
-const BEFORE: Style = plain(GREY, Dash::Solid);
+const BEFORE: Style = plain(PURPLE, Dash::Solid);
 
 /// Figure 9.
 pub(in super::super) fn poses(studio: &mut Studio<'_>) -> Result<String, Obstacle> {

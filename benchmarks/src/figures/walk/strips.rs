@@ -8,9 +8,9 @@ use super::super::{Obstacle, Studio, place_of};
 use super::{SHORT, scenarios};
 
 /// Room between postures of Melson (m), from the side and from the front.
-const MELSON_GAPS_M: [f64; 2] = [0.30, 0.36];
+const MELSON_GAPS_M: [f64; 2] = [0.17, 0.27];
 /// The same for Hubo.
-const HUBO_GAPS_M: [f64; 2] = [0.70, 1.00];
+const HUBO_GAPS_M: [f64; 2] = [0.45, 0.75];
 
 /// Figures 6 to 8.
 pub(in super::super) fn melson(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
@@ -22,7 +22,7 @@ pub(in super::super) fn melson(studio: &mut Studio<'_>) -> Result<String, Obstac
                 view,
                 title: format!("Fig. {number}  {}, from {from}", one.scenario.name),
                 gap_m,
-                height: 175.0,
+                height: 185.0,
             };
             rows.push(strip.row(&one.walked));
         }

@@ -41,11 +41,15 @@ fn walks_give_every_figure_with_what_they_name() {
         ),
         (
             "melson_fig10_drift.svg",
-            &["right hip roll (rad)", "largest change in a cycle (rad)"],
+            &[
+                "right hip roll (rad)",
+                "right hip pitch at the ends of the cycles",
+                "largest change in a cycle (rad)",
+            ],
         ),
         (
             "melson_objectives.svg",
-            &["H_joint", "H_grav (N²m²)", "left foot stands alone"],
+            &["H_joint (–)", "H_grav (N²m²)", "left foot stands alone"],
         ),
         (
             "melson_zmp.svg",
