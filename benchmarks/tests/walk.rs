@@ -205,7 +205,7 @@ fn every_robot_walks_with_its_zero_moment_point_on_its_reference() {
 fn all_methods_walk_hubo_the_same_way() {
     let exact = Walked::new("walk/hubo", "walk", "ik4");
     assert_eq!(exact.case.problem.robot().nv(), 30);
-    for id in ["ik1", "ik2", "ik3", "ik5", "clik", "davies"] {
+    for id in ["ik1", "ik2", "ik3", "ik5", "clik", "davies", "closed-form"] {
         let other = Walked::new("walk/hubo", "walk", id);
         let robot = exact.case.problem.robot();
         let pairs = exact.q.iter().zip(&other.q);

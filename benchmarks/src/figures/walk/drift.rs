@@ -1,8 +1,8 @@
-//! Figure 10: the right hip roll over thirty steps, and what the joints change from cycle to cycle.
+//! Figure 10: the right hip over thirty steps, and what the joints change from cycle to cycle.
 
 use super::super::axis::Axis;
 use super::super::figure::{Figure, PanelRow};
-use super::super::panel::{Markers, Panel, time_axis};
+use super::super::panel::{Markers, Panel, share_y, time_axis};
 use super::super::style::Marker;
 use super::super::walked::{Walked, line};
 use super::super::{Obstacle, Points, Studio};
@@ -10,24 +10,23 @@ use super::{LONG, SCENARIOS, Shown, place_of, scenarios};
 
 const MARKERS: [Marker; SCENARIOS.len()] = [Marker::Circle, Marker::Square, Marker::Triangle];
 
-/// Joints followed from cycle to cycle: that of the paper, and one that drifts more.
-const FOLLOWED: [(&str, &str); 2] = [
-    ("r_hip_roll", "right hip roll"),
+/// Joints shown: that of the paper, and one that drifts more.
+const JOINTS: [(&str, &str); 2] = [
+    ("r_hip_roll", "Fig. 10  right hip roll"),
     ("r_hip_pitch", "right hip pitch"),
 ];
 
 /// Figure 10.
 pub(in super::super) fn drift(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
     let shown = scenarios(studio, LONG)?;
-    let mut hip = Panel::new("Fig. 10", time_axis(), Axis::linear("right hip roll (rad)"));
-    let mut followed = FOLLOWED.map(|(_, name)| {
-        let title = format!("{name} at the ends of the cycles");
-        Panel::new(&title, time_axis(), Axis::linear("less the first (rad)"))
+    let mut angle = JOINTS.map(|(_, title)| Panel::new(title, time_axis(), Axis::linear("angle (rad)")));
+    let mut less = JOINTS.map(|_| {
+        let title = "at the ends of the cycles, less the first";
+        Panel::new(title, time_axis(), Axis::linear("angle (rad)"))
     });
-    let mut change = Panel::new("", time_axis(), Axis::log("largest change in a cycle (rad)"));
+    let mut change = ["right hip roll", "joint that changes most"]
+        .map(|title| Panel::new(title, time_axis(), Axis::log("change in a cycle (rad)")));
     for (Shown { scenario, walked }, marker) in shown.iter().zip(MARKERS) {
-        let points = walked.over_time(FOLLOWED[0].0)?;
-        hip.curves.push(line(scenario.name, points, scenario.style, 1.5));
         let ends = cycle_ends(walked);
         let marked = |points| {
             let mut curve = line(scenario.name, points, scenario.style, 1.5);
@@ -35,23 +34,30 @@ pub(in super::super) fn drift(studio: &mut Studio<'_>) -> Result<String, Obstacl
             curve.markers = Markers::Every;
             curve
         };
-        for (panel, (joint, _)) in followed.iter_mut().zip(FOLLOWED) {
+        for (i, (joint, _)) in JOINTS.into_iter().enumerate() {
             let points = walked.over_time(joint)?;
-            let first = ends.first().map_or(0.0, |&k| points[k].1);
-            let less = ends.iter().map(|&k| (points[k].0, points[k].1 - first));
-            panel.curves.push(marked(less.collect()));
+            let at_ends: Points = ends.iter().map(|&k| points[k]).collect();
+            let first = at_ends.first().map_or(0.0, |p| p.1);
+            if i == 0 {
+                let pairs = at_ends.windows(2);
+                let changes = pairs.map(|p| (p[1].0, (p[1].1 - p[0].1).abs()));
+                change[0].curves.push(marked(changes.collect()));
+            }
+            less[i]
+                .curves
+                .push(marked(at_ends.into_iter().map(|(t, v)| (t, v - first)).collect()));
+            angle[i]
+                .curves
+                .push(line(scenario.name, points, scenario.style, 1.5));
         }
-        change.curves.push(marked(changes(walked, &ends)));
+        change[1].curves.push(marked(changes(walked, &ends)));
     }
-    let rows = vec![
-        PanelRow::new(270.0, vec![hip]),
-        PanelRow::new(220.0, followed.into()),
-        PanelRow::new(260.0, vec![change]),
-    ];
+    share_y(&mut change);
+    let rows = [(angle, 250.0), (less, 220.0), (change, 240.0)]
+        .map(|(panels, height)| PanelRow::new(height, panels.into()));
     let title = format!("Fig. 10  Drift over 30 steps: {}", place_of(&shown));
-    let remark = "A cycle is two steps, 10 s, after which feet, hands and centre of mass stand to each other as before. Below: \
-                  the joint that changes most.";
-    Ok(Figure::new(title, rows)
+    let remark = "A cycle is two steps, 10 s, after which feet, hands and centre of mass stand to each other as before.";
+    Ok(Figure::new(title, rows.to_vec())
         .with_remarks(vec![remark.to_owned()])
         .render()?)
 }

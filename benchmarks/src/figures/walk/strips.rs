@@ -8,9 +8,9 @@ use super::super::{Obstacle, Studio, place_of};
 use super::{SHORT, scenarios};
 
 /// Room between postures of Melson (m), from the side and from the front.
-const MELSON_GAPS_M: [f64; 2] = [0.17, 0.27];
+const MELSON_GAPS_M: [f64; 2] = [0.26, 0.26];
 /// The same for Hubo.
-const HUBO_GAPS_M: [f64; 2] = [0.45, 0.75];
+const HUBO_GAPS_M: [f64; 2] = [0.45, 0.72];
 
 /// Figures 6 to 8.
 pub(in super::super) fn melson(studio: &mut Studio<'_>) -> Result<String, Obstacle> {

@@ -42,9 +42,9 @@ fn walks_give_every_figure_with_what_they_name() {
         (
             "melson_fig10_drift.svg",
             &[
-                "right hip roll (rad)",
-                "right hip pitch at the ends of the cycles",
-                "largest change in a cycle (rad)",
+                "right hip roll",
+                "at the ends of the cycles, less the first",
+                "joint that changes most",
             ],
         ),
         (
