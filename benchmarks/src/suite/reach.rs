@@ -79,7 +79,9 @@ fn first_out_of_reach(
     };
     let mut q = q_start.to_vec();
     for (i, step) in walk.plan.steps.iter().enumerate() {
-        for t in [step.lift_off_s, step.touch_down_s] {
+        // A motion that ends before the walk does asks for no more.
+        let ends = [step.lift_off_s, step.touch_down_s].into_iter();
+        for t in ends.filter(|t| *t <= walk.until_s) {
             let closed = closer.close(trajectory, t, &q, place)?;
             if let Some(miss) = closed.miss {
                 let step = i + 1;

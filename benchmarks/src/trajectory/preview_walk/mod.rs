@@ -31,6 +31,8 @@ pub struct PreviewWalk {
     pub spec: WalkSpec,
     /// Its steps.
     pub plan: Plan,
+    /// How far the centre of mass is known (s): to the end of the motion and of what may be seen beyond it.
+    pub until_s: f64,
     centre_of_mass: CentreOfMass,
     /// First rows of the tasks of the feet, right and left.
     foot_rows: [usize; 2],
@@ -142,6 +144,7 @@ impl PreviewWalk {
         Ok(Self {
             spec: spec.clone(),
             plan,
+            until_s,
             centre_of_mass,
             foot_rows: [right, left],
             com_row,
