@@ -1,9 +1,21 @@
-//! Closed form: time of all solutions of one pose, poses taken in turn from a fixed set.
+//! Closed form: time of all solutions of one pose, poses taken in turn from a fixed set; one step of the whole robot.
 
-use std::f64::consts::PI;
+#![allow(clippy::unwrap_used, missing_docs, reason = "a bench")]
+
+#[allow(dead_code, reason = "shared with the tests")]
+#[path = "../tests/common/fixture.rs"]
+mod fixture;
+
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::hint::black_box;
+use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use fixture::{DT_S, Fixture, PHASE, parts};
+use ik_core::driver::StepInput;
+use ik_core::robot::embedded;
+use ik_core::step::Window;
+use ik_core::task::{OrientationCoordinates, Track};
 use ik_methods::reverse_decoupling::general::{DhRow, GeneralLimb, Solutions};
 use ik_methods::reverse_decoupling::quartic::real_roots;
 
@@ -117,5 +129,56 @@ fn quartic(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, general_limbs, quartic);
+/// One step of Hubo on its feet, hands held: the root placed by its task, and by the centre of mass.
+fn whole_robot(criterion: &mut Criterion) {
+    let robot = Arc::new(embedded("hubo").unwrap());
+    let frame = |name: &str| robot.frame(name).unwrap();
+    let ends = [
+        ("right-foot", Track::Pose(frame("r_sole"))),
+        ("left-foot", Track::Pose(frame("l_sole"))),
+        ("right-hand", Track::Pose(frame("r_hand"))),
+        ("left-hand", Track::Pose(frame("l_hand"))),
+    ];
+    let placed = [("waist", Track::Pose(frame("waist")))];
+    let balanced = [
+        ("turn", Track::Orientation(frame("waist"))),
+        ("com", Track::CentreOfMass),
+    ];
+    let mut start = robot.neutral();
+    let leg = [0.0, -FRAC_PI_2, -0.4, 0.8, -0.4, 0.0];
+    let arm = [1.4, -1.3, -1.4, 1.1, -0.5, 1.1];
+    for (joints, values) in start[7..].chunks_mut(6).zip([leg, leg, arm, arm]) {
+        joints.copy_from_slice(&values);
+    }
+    let mut group = criterion.benchmark_group("closed_form step");
+    for (name, root) in [("root placed", &placed[..]), ("root balanced", &balanced[..])] {
+        let tasks = [&ends[..], root].concat();
+        let parts = parts(&robot, &tasks, OrientationCoordinates::Log);
+        let fixture = Fixture::new(parts, start.clone());
+        let (nx, nxdot) = (fixture.problem.nx(), fixture.problem.nxdot());
+        // The right foot is lifted by half a millimetre.
+        let mut ahead = fixture.target.clone();
+        ahead[2] += 5e-4;
+        let rest = vec![0.0; nxdot];
+        let data = [&fixture.target[..], &rest, &ahead, &rest].concat();
+        for id in ["closed-form", "ik1", "clik"] {
+            let mut driver = fixture.driver(id, "");
+            let majors = driver.majors();
+            let input = StepInput {
+                q_prev: &fixture.start,
+                v_prev: &vec![0.0; robot.nv()],
+                dt_s: DT_S,
+                phase: PHASE,
+                targets: Window::new(&data, nx, nxdot).unwrap(),
+                gains: &[],
+            };
+            group.bench_function(format!("{id}, {name}"), |bench| {
+                bench.iter(|| driver.step(black_box(&input), majors));
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, general_limbs, quartic, whole_robot);
 criterion_main!(benches);

@@ -4,10 +4,14 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench")]
 
 #[allow(dead_code, reason = "shared with the tests")]
+#[path = "../tests/common/fixture.rs"]
+mod fixture;
+#[allow(dead_code, reason = "shared with the tests")]
 #[path = "../tests/null_space/support.rs"]
 mod support;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use fixture::{DT_S, PHASE};
 use ik_core::driver::StepInput;
 use ik_core::evaluator::Evaluator;
 use ik_core::kinematics::Page;
@@ -16,7 +20,7 @@ use ik_core::robot::{Robot, Root, UrdfOptions};
 use ik_core::step::Window;
 use std::fmt::Write;
 use std::hint::black_box;
-use support::{DT_S, PHASE, melson};
+use support::melson;
 
 /// Gains of the scenarios S1 and S3 of the source.
 const GAINS: [(&str, [f64; 2]); 2] = [("without", [0.0, 0.0]), ("both", [0.35, 1.6])];

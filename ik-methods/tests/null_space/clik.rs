@@ -1,7 +1,8 @@
 //! Steps of closed-loop inverse kinematics against eq. (9) written out: root eliminated by matrices, J⁺ by singular values,
 //! P formed.
 
-use crate::support::{DT_S, Fixture, PHASE, arm, melson, targets_at};
+use crate::fixture::{DT_S, Fixture, PHASE, targets_at};
+use crate::support::{arm, melson};
 use ik_core::evaluator::{Evaluator, Linearisation};
 use ik_core::formulation::{Declined, Termination};
 use ik_core::problem::ProblemParts;

@@ -1,6 +1,7 @@
 //! Repeated steps at a resting target go down the objective to where it has no descent in the null space of the tasks.
 
-use crate::support::{DT_S, Fixture, PHASE, arm, melson};
+use crate::fixture::{DT_S, Fixture, PHASE};
+use crate::support::{arm, melson};
 use ik_core::evaluator::{Evaluator, Linearisation};
 use ik_core::formulation::Use;
 use ik_core::step::Sample;

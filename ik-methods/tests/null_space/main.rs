@@ -9,5 +9,6 @@
 
 mod clik;
 mod descent;
-#[allow(dead_code, reason = "shared with a bench")]
+#[path = "../common/fixture.rs"]
+mod fixture;
 mod support;

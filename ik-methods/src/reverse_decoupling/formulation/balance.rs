@@ -14,6 +14,8 @@ const MET_M: f64 = 1e-11;
 const LEAST_GAIN: f64 = 1e-6;
 /// Step lengths along a direction.
 const LENGTHS: [f64; 2] = [1.0, 0.25];
+/// The waist first takes Newton's step from q⁻; where it fails, these parts of the way the centre of mass has to go.
+const FIRST_LENGTHS: [Option<f64>; 5] = [None, Some(1.0), Some(0.5), Some(0.25), Some(0.0)];
 /// Most rounds of cuts per step of the waist.
 const MOST_CUTS: usize = 2;
 
@@ -41,13 +43,12 @@ impl Step<'_> {
         start.origin = before;
         start.q.copy_from_slice(self.step.q_prev);
         start.merit.away = centre - start.page.centre_of_mass();
-        let (first, _) = self.next(Way::Along, &work.best, &work.region);
         let ahead = work.best.merit.away;
-        let along = |length: f64| work.region.nearest(&(before + ahead * length), &before);
-        let guesses = [first, along(1.0), along(0.5), along(0.25), along(0.0)];
-        for (k, guess) in guesses.into_iter().enumerate() {
+        let (newton, _) = self.next(Way::Along, &work.best, &work.region);
+        for length in FIRST_LENGTHS {
+            let guess = length.map_or(newton, |part| work.region.nearest(&(before + ahead * part)));
             self.evaluate(guess, centre, work, eval);
-            if k == 0 || work.trial.merit.is_better_than(&work.best.merit) {
+            if length.is_none() || work.trial.merit.is_better_than(&work.best.merit) {
                 std::mem::swap(&mut work.trial, &mut work.best);
             }
             if work.best.merit.stands() {
@@ -81,7 +82,7 @@ impl Step<'_> {
     fn next(&self, way: Way, from: &Candidate, region: &Region) -> (Vector3<f64>, Vector3<f64>) {
         let (origin, away) = (from.origin, from.merit.away);
         let along = || {
-            let target = region.nearest(&(origin + away), &origin);
+            let target = region.nearest(&(origin + away));
             (target, away - (target - origin))
         };
         let rate = centre_of_mass_rate(self.robot, self.plan, from);
@@ -94,7 +95,7 @@ impl Step<'_> {
             Way::Along => along(),
             Way::Best => {
                 let best = origin + region.best_motion(&away, &origin, &inverse);
-                let target = region.nearest(&best, &best);
+                let target = region.nearest(&best);
                 (target, away - rate * (target - origin))
             }
         }
@@ -115,7 +116,7 @@ impl Step<'_> {
                 let (target, predicted) = if merit.stands() {
                     self.next(way, &work.best, &work.region)
                 } else {
-                    (work.region.nearest(&from, &from), Vector3::zeros())
+                    (work.region.nearest(&from), Vector3::zeros())
                 };
                 let gains = !merit.stands() || predicted.norm() < (1.0 - LEAST_GAIN) * merit.away.norm();
                 let Some(length) = lengths.next().filter(|_| gains) else {

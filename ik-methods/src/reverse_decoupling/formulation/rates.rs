@@ -88,3 +88,142 @@ pub(super) fn is_regular(m: &Matrix3<f64>) -> bool {
     let scale = m.column_iter().map(|c| c.norm()).product::<f64>();
     m.determinant().abs() > SINGULAR * scale
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use super::*;
+    use crate::generic_posture::generic_postures;
+    use ik_core::boundary::Boundary;
+    use ik_core::configuration::integrate;
+    use ik_core::kinematics::forward;
+    use ik_core::kinematics::jacobian::{Axes, frame_jacobian};
+    use ik_core::problem::{Kind, Phase, Problem, ProblemParts, Supplies};
+    use ik_core::robot::{FrameId, embedded};
+    use ik_core::task::{OrientationCoordinates, Priority, Task, Track};
+    use std::sync::Arc;
+
+    fn plan(robot: &Robot, ends: &[Track]) -> Plan {
+        let mut tracks = vec![
+            Track::Orientation(robot.frame("waist").unwrap()),
+            Track::CentreOfMass,
+        ];
+        tracks.extend(ends);
+        let named = |(i, track): (usize, &Track)| Task {
+            name: format!("task {i}"),
+            track: *track,
+        };
+        let parts = ProblemParts {
+            robot: Arc::new(robot.clone()),
+            tasks: tracks.iter().enumerate().map(named).collect(),
+            phases: vec![Phase {
+                name: "whole".into(),
+                support: None,
+                tasks: (0..tracks.len()).map(|i| (i, Priority::Hard)).collect(),
+            }],
+            boundary: Boundary::None,
+            objectives: vec![],
+            kind: Kind::Tracking,
+            supplies: Supplies {
+                rates: true,
+                preview_s: 0.0,
+            },
+            orientation: OrientationCoordinates::Log,
+        };
+        let problem = Problem::new(parts).unwrap();
+        Plan::new(&problem, &problem.phases()[0]).unwrap()
+    }
+
+    /// The Jacobian of every end vanishes along the rates, and differences of the centre of mass are D.
+    #[test]
+    fn ends_rest_and_the_centre_of_mass_moves_with_the_rate() {
+        let pose = |robot: &Robot, name: &str| Track::Pose(robot.frame(name).unwrap());
+        let point = |robot: &Robot, name: &str| Track::Position(robot.frame(name).unwrap());
+        let mut checked = 0;
+        for (id, hands) in [
+            ("hubo", "pose"),
+            ("hrp2", "pose"),
+            ("asimo", "none"),
+            ("bioloid", "point"),
+        ] {
+            let robot = embedded(id).unwrap();
+            let feet = if id == "bioloid" {
+                ["r_foot", "l_foot"]
+            } else {
+                ["r_sole", "l_sole"]
+            };
+            let mut ends: Vec<Track> = feet.map(|name| pose(&robot, name)).to_vec();
+            match hands {
+                "pose" => ends.extend(["r_hand", "l_hand"].map(|name| pose(&robot, name))),
+                "point" => ends.extend(["r_hand", "l_hand"].map(|name| point(&robot, name))),
+                _ => {}
+            }
+            let plan = plan(&robot, &ends);
+            assert_eq!(plan.limbs.len(), ends.len());
+            let mut at = Candidate::new(&robot);
+            for q in generic_postures(&robot) {
+                at.q.copy_from_slice(&q);
+                forward(&robot, &q, &mut at.page);
+                let root = root_pose(&robot, &q);
+                let rate = centre_of_mass_rate(&robot, &plan, &at);
+                // Velocity for each direction of the root; the linear rates of the root are in world axes.
+                let mut velocities = [0, 1, 2].map(|k| {
+                    let mut v = vec![0.0; robot.nv()];
+                    v[k] = 1.0;
+                    v
+                });
+                for limb in &plan.limbs {
+                    for (c, rate) in limb
+                        .coordinates
+                        .iter()
+                        .zip(joint_rates(&robot, limb, &root, &at.page))
+                    {
+                        for (v, rate) in velocities.iter_mut().zip(rate.iter()) {
+                            v[6 + c] = *rate;
+                        }
+                    }
+                }
+                for (k, v) in velocities.iter().enumerate() {
+                    for (limb, track) in plan.limbs.iter().zip(ends_of(&plan, &ends, &robot)) {
+                        let rows = if matches!(limb.target, Target::Pose(..)) {
+                            6
+                        } else {
+                            3
+                        };
+                        let moved = frame_jacobian(&robot, &at.page, track, Axes::World)
+                            * nalgebra::DVector::from_column_slice(v);
+                        let worst = moved.rows(0, rows).amax();
+                        assert!(worst < 1e-10, "{id}: an end moves by {worst:e}");
+                    }
+                    let fastest = v.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+                    let h = 1e-5 / fastest;
+                    let centre = |sign: f64| {
+                        let step: Vec<f64> = v.iter().map(|v| sign * h * v).collect();
+                        let mut page = Page::new(&robot);
+                        forward(&robot, &integrate(&robot, &q, &step), &mut page);
+                        page.centre_of_mass()
+                    };
+                    let difference = (centre(1.0) - centre(-1.0)) / (2.0 * h);
+                    let worst = (difference - rate.column(k)).amax();
+                    assert!(worst < 1e-9 * fastest, "{id}: D is off by {worst:e}");
+                    checked += 1;
+                }
+            }
+        }
+        assert_eq!(checked, 4 * 3 * 3);
+    }
+
+    /// Frames of the ends in the order of the limbs.
+    fn ends_of(plan: &Plan, ends: &[Track], robot: &Robot) -> Vec<FrameId> {
+        let frame = |track: &Track| match track {
+            Track::Pose(frame) | Track::Position(frame) => *frame,
+            _ => unreachable!("ends are poses and points"),
+        };
+        let of = |tip: usize| {
+            let mut frames = ends.iter().map(frame);
+            frames.find(|frame| robot.frames()[frame.0].body == tip).unwrap()
+        };
+        plan.limbs.iter().map(|limb| of(limb.tip)).collect()
+    }
+}

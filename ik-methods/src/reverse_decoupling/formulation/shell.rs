@@ -56,7 +56,12 @@ impl Shell {
     ) -> Option<Self> {
         let (lines, _) = limb_axes(robot, joints);
         let base = meeting(&lines[..2]);
-        (base.miss_m <= MEETS_M).then(|| Self::between(table, base.point.into(), *point, 2))
+        // The rows end in the virtual wrist, whose origin is the point.
+        let wrist = Self::between(table, base.point.into(), Point3::origin(), 2);
+        (base.miss_m <= MEETS_M).then_some(Self {
+            tip_point: *point,
+            ..wrist
+        })
     }
 
     fn between(
@@ -99,5 +104,82 @@ impl Shell {
             root(if passes(peak + PI) { least } else { a.min(b) }),
             root(if passes(peak) { largest } else { a.max(b) }),
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use super::*;
+    use crate::generic_posture::generic_postures;
+    use crate::reverse_decoupling::analyser::{Verdict, denavit_hartenberg, limbs, with_virtual_wrist};
+    use ik_core::kinematics::{Page, forward};
+    use ik_core::robot::{FrameId, embedded};
+    use nalgebra::Isometry3;
+
+    /// Pose of a body in the world.
+    fn body(robot: &Robot, page: &Page, body: usize) -> Isometry3<f64> {
+        let id = robot
+            .frames()
+            .iter()
+            .position(|frame| frame.body == body)
+            .unwrap();
+        page.frame_pose(robot, FrameId(id)) * robot.frames()[id].x_body_frame.inverse()
+    }
+
+    #[test]
+    fn the_hinge_alone_sets_the_distance_and_its_interval_the_shell() {
+        let mut checked = 0;
+        for id in ["hubo", "hrp2", "asimo", "bioloid", "coman-legs", "arm6"] {
+            let robot = embedded(id).unwrap();
+            for limb in limbs(&robot) {
+                let shell = match (&limb.verdict, limb.joints.len()) {
+                    (Verdict::ClosedForm(family), 6) => {
+                        let table = denavit_hartenberg(&robot, &limb).unwrap();
+                        Shell::of(&robot, &limb.joints, &table, family.triple())
+                    }
+                    (_, 3) => {
+                        let point = Point3::new(0.01, 0.02, 0.1);
+                        let table = with_virtual_wrist(&robot, &limb, &point).unwrap();
+                        Shell::of_point(&robot, &limb.joints, &table, &point)
+                    }
+                    _ => None,
+                };
+                let Some(shell) = shell else {
+                    continue;
+                };
+                let coordinate = |k: usize| robot.root().nq() + robot.joints()[limb.joints[k]].coordinate;
+                let mut page = Page::new(&robot);
+                for mut q in generic_postures(&robot) {
+                    let hinge = coordinate(shell.hinge);
+                    let (lo, hi) = (q[hinge] - 0.7, q[hinge] + 1.9);
+                    let (mut least, mut largest) = (f64::INFINITY, 0.0_f64);
+                    const SAMPLES: i32 = 2600;
+                    for i in 0..=SAMPLES {
+                        q[hinge] = lo + (hi - lo) * f64::from(i) / f64::from(SAMPLES);
+                        forward(&robot, &q, &mut page);
+                        let base = body(&robot, &page, limb.base) * shell.base_point;
+                        let tip = body(&robot, &page, limb.tip) * shell.tip_point;
+                        let distance = (tip - base).norm();
+                        let (a, b) = shell.distances(q[hinge], q[hinge]);
+                        assert!((a - distance).abs() < 1e-9 && (b - distance).abs() < 1e-9, "{id}");
+                        (least, largest) = (least.min(distance), largest.max(distance));
+                    }
+                    // Extremes between samples are off by the square of half a step.
+                    let (a, b) = shell.distances(lo, hi);
+                    assert!(
+                        a <= least + 1e-12 && least - a < 1e-6,
+                        "{id}: {a}, sampled {least}"
+                    );
+                    assert!(
+                        b >= largest - 1e-12 && b - largest < 1e-6,
+                        "{id}: {b}, sampled {largest}"
+                    );
+                    checked += 1;
+                }
+            }
+        }
+        assert!(checked >= 3 * 12, "{checked}");
     }
 }

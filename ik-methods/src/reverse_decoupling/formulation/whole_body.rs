@@ -56,7 +56,7 @@ impl Merit {
 }
 
 impl Candidate {
-    fn new(robot: &Robot) -> Self {
+    pub(super) fn new(robot: &Robot) -> Self {
         Self {
             origin: Vector3::zeros(),
             q: robot.neutral(),
