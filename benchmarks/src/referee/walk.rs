@@ -166,16 +166,10 @@ fn judge_zmp(
     }
     quality.zmp_reference_error_rms_m = error.rms();
     quality.zmp_reference_error_max_m = error.rms().map(|_| error.largest());
-    let least = |margins: Vec<f64>| margins.into_iter().reduce(f64::min);
-    quality.settled_cart_zmp_margin_min_m = least(
-        counted
-            .iter()
-            .map(|(balance, _)| balance.cart_zmp_margin_m())
-            .collect(),
-    );
-    quality.settled_zmp_margin_min_m = counted
-        .iter()
-        .map(|(balance, _)| balance.zmp_margin_m())
-        .collect::<Option<_>>()
-        .and_then(least);
+    let carts = counted.iter().map(|(balance, _)| balance.cart_zmp_margin_m());
+    quality.settled_cart_zmp_margin_min_m = carts.reduce(f64::min);
+    // One sample without a zero-moment point leaves no least margin.
+    let masses = counted.iter().map(|(balance, _)| balance.zmp_margin_m());
+    let masses: Option<Vec<f64>> = masses.collect();
+    quality.settled_zmp_margin_min_m = masses.and_then(|m| m.into_iter().reduce(f64::min));
 }

@@ -233,17 +233,15 @@ fn targets(
     let field = |name: &str| format!("scenarios[{index}].{name}");
     let locomotion = match (&scenario.gait, &scenario.walk) {
         (None, None) => None,
-        (Some(gait), None) => Some(Locomotion::Gait(Gait::new(
-            gait,
-            problem,
-            source,
-            &field("gait"),
-        )?)),
+        (Some(gait), None) => {
+            let gait = Gait::new(gait, problem, source, &field("gait"))?;
+            Some(Locomotion::Gait(Box::new(gait)))
+        }
         (None, Some(walk)) => {
             let values = task_values(problem, guess);
             let field = field("walk");
             let walk = PreviewWalk::new(walk, problem, &values, grid, source, &field)?;
-            Some(Locomotion::Walk(walk))
+            Some(Locomotion::Walk(Box::new(walk)))
         }
         (Some(_), Some(_)) => {
             let found = "a second source of the same targets";

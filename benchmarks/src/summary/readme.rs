@@ -133,7 +133,7 @@ fn walk_cells(group: &[&Labelled<'_>]) -> Vec<String> {
     let of = |suite: usize, scenario: &str| metrics(run_of(group, WALKS[suite], scenario));
     let [nothing, centring, both] = ["S1", "S2", "S3"].map(|scenario| of(0, scenario));
     let (hubo, bioloid) = (of(2, "walk"), of(3, "walk"));
-    let value = |m: &Option<Metrics>, v: fn(&Metrics) -> Option<f64>| number(m.as_ref().and_then(|m| v(m)));
+    let value = |m: &Option<Metrics>, v: fn(&Metrics) -> Option<f64>| number(m.as_ref().and_then(v));
     let centred = |m| value(m, |m| m.quality.objective_mean.get("joint-centring").copied());
     let torque = |m| value(m, |m| m.quality.single_support_torque_squared_mean_n2m2);
     let hard = |m| millimetres(m, |m| Some(m.quality.hard_error_max_m));

@@ -54,9 +54,9 @@ pub struct Trajectory {
 #[derive(Clone, Debug)]
 pub enum Locomotion {
     /// Splines through knots.
-    Gait(Gait),
+    Gait(Box<Gait>),
     /// Footsteps and preview control.
-    Walk(PreviewWalk),
+    Walk(Box<PreviewWalk>),
 }
 
 impl Locomotion {

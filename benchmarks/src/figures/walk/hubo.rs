@@ -12,6 +12,9 @@ const N: u64 = 15;
 /// Samples over which a step time is median-filtered.
 const TIME_WINDOW: usize = 11;
 
+/// A quantity over time, if the trace has it.
+type Channel = fn(&Traced<'_>) -> Option<Points>;
+
 /// Error and step time over the walk.
 pub(in super::super) fn methods(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
     let mut runs = studio.runs_of("walk/hubo", "walk");
@@ -20,7 +23,7 @@ pub(in super::super) fn methods(studio: &mut Studio<'_>) -> Result<String, Obsta
     let Some(first) = traced.first() else {
         return Err(Obstacle::NoData("no run with a trace on walk/hubo".to_owned()));
     };
-    let channels: [(&str, fn(&Traced<'_>) -> Option<Points>, f64); 3] = [
+    let channels: [(&str, Channel, f64); 3] = [
         (
             "largest position error (m)",
             |t| largest_over_time(&t.trace, "_error_m"),

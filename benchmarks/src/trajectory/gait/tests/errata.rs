@@ -29,7 +29,7 @@ fn refusal(walk: Walk, from_s: f64, to_s: f64) -> Option<String> {
     let mut trajectory = trajectory();
     let mut gait: Gait = trajectory.gait().unwrap().clone();
     gait.rows = rows(&gait.spec, &walk, &gait.waist, &gait.legs, &gait.arms);
-    trajectory.locomotion = Some(Locomotion::Gait(gait.clone()));
+    trajectory.locomotion = Some(Locomotion::Gait(Box::new(gait.clone())));
     let count = ((to_s - from_s) / 0.01).round() as u32;
     let times = (0..=count).map(|k| from_s + 0.01 * f64::from(k));
     gait.check_reach(&trajectory, times, "printed", "gait")
