@@ -53,7 +53,7 @@ fn walks_give_every_figure_with_what_they_name() {
         ),
         (
             "melson_zmp.svg",
-            &["reference", "off the reference (m)", "scenario S1"],
+            &["reference", "off the reference (m)", "scenario S3"],
         ),
         ("walk_hubo_zmp.svg", &["extent of the support polygon"]),
         ("walk_hubo_strip.svg", &["Hubo walking: closed-form", "9.6 s"]),

@@ -16,9 +16,9 @@ const POINTS: [(&str, &str, Style, f64); 4] = [
     ("gcom", "centre of mass", plain(ORANGE, Dash::Long), 2.2),
 ];
 
-/// Melson without objectives.
+/// Melson with both objectives, which change nothing in it.
 pub(in super::super) fn melson(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
-    zmp(studio, SHORT, "S1")
+    zmp(studio, SHORT, "S3")
 }
 
 /// Hubo.
