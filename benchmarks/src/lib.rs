@@ -9,6 +9,7 @@ pub mod error;
 pub mod figures;
 pub mod instance;
 pub mod limb_pose;
+pub mod limbs;
 pub mod machine;
 pub mod records;
 pub mod records_io;

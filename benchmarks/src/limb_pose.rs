@@ -235,7 +235,7 @@ fn reached(robot: &Robot, report: &LimbReport, frame: FrameId, q: &[f64]) -> Iso
 }
 
 /// Indicators of a branch; wrist and shoulder of a left arm have the other sign.
-fn indicators(report: &LimbReport, branch: u8) -> BTreeMap<&'static str, i8> {
+pub(crate) fn indicators(report: &LimbReport, branch: u8) -> BTreeMap<&'static str, i8> {
     let sign = |value: f64| if value < 0.0 { -1 } else { 1 };
     let arm = if report.side == Side::Left { -1 } else { 1 };
     let ik_methods::reverse_decoupling::analyser::Verdict::ClosedForm(family) = report.verdict else {

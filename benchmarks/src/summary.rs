@@ -7,7 +7,8 @@ mod terminal;
 mod walk;
 
 use crate::figures::labels::{Labelled, labelled};
-use crate::records::{Effort, Metrics, Quality, Row};
+use crate::limbs::{LimbRow, limbs_markdown};
+use crate::records::{Effort, Machine, Metrics, Quality, Row};
 use crate::records_io::{RecordError, write_atomically};
 pub use readme::{RESULTS_BEGIN, RESULTS_END, readme_table, replace_readme_table};
 use std::collections::BTreeMap;
@@ -17,19 +18,22 @@ pub use terminal::{TERMINAL_WIDTH, terminal_table};
 use walk::walk_table;
 
 /// Shown where there is no number.
-const NONE: &str = "–";
+pub(crate) const NONE: &str = "–";
 
-/// Writes `summary.md` into a results folder and returns its path. `analysis` holds the text of each suite by its id.
+/// Writes `summary.md` into a results folder and returns its path: the runs, then the limbs. `analysis` holds the text of
+/// each suite by its id.
 ///
 /// # Errors
 /// Io.
 pub fn write_summary(
     dir: &Path,
     rows: &[Row],
+    limbs: &[LimbRow],
     analysis: &BTreeMap<String, String>,
 ) -> Result<PathBuf, RecordError> {
     let path = dir.join("summary.md");
-    write_atomically(&path, &summary_markdown(rows, analysis))?;
+    let text = summary_markdown(rows, analysis) + &limbs_markdown(limbs, analysis);
+    write_atomically(&path, &text)?;
     Ok(path)
 }
 
@@ -124,7 +128,7 @@ fn yes_no(survived: bool) -> &'static str {
 }
 
 /// Three significant digits, with an exponent outside 0.001 … 99 999.
-fn number(value: Option<f64>) -> String {
+pub(crate) fn number(value: Option<f64>) -> String {
     let Some(value) = value else {
         return NONE.to_owned();
     };
@@ -139,7 +143,7 @@ fn number(value: Option<f64>) -> String {
     format!("{value:.decimals$}")
 }
 
-fn markdown<S: AsRef<str>>(header: &[S], lines: &[Vec<String>]) -> String {
+pub(crate) fn markdown<S: AsRef<str>>(header: &[S], lines: &[Vec<String>]) -> String {
     let header: Vec<&str> = header.iter().map(AsRef::as_ref).collect();
     let mut text = format!("| {} |\n|{}\n", header.join(" | "), "---|".repeat(header.len()));
     for line in lines {
@@ -151,12 +155,16 @@ fn markdown<S: AsRef<str>>(header: &[S], lines: &[Vec<String>]) -> String {
 
 /// Where and with what the rows were made.
 fn origin(rows: &[Row]) -> String {
+    made_with(rows.iter().map(|row| (row.revision.as_str(), &row.machine)))
+}
+
+/// One line per revision and machine.
+pub(crate) fn made_with<'a>(origins: impl Iterator<Item = (&'a str, &'a Machine)>) -> String {
     let mut lines: Vec<String> = Vec::new();
-    for row in rows {
-        let machine = &row.machine;
+    for (revision, machine) in origins {
         let line = format!(
-            "Made with revision {} on {}, {} logical processors, {}.",
-            row.revision, machine.cpu, machine.cores, machine.system
+            "Made with revision {revision} on {}, {} logical processors, {}.",
+            machine.cpu, machine.cores, machine.system
         );
         if !lines.contains(&line) {
             lines.push(line);

@@ -256,6 +256,7 @@ fn lists_name_what_there_is() {
         suites.contains("coman/asymmetric") && suites.contains("C8_2_3"),
         "{suites}"
     );
+    assert!(suites.contains("closed-form/grid: "), "{suites}");
     assert!(folder.succeed(&["list", "robots"]).contains("coman-legs"));
 }
 
@@ -330,6 +331,50 @@ fn a_limb_takes_a_pose_in_all_its_postures() {
     let skewed = file("r_sole", -0.7, "").replace("[0.0, 0.0, 0.0, 1.0]", "[0.0, 0.3, 0.0, 1.0]");
     let path = folder.write("bad.json", &skewed);
     folder.refuse(&["solve", &path], &["rotation_xyzw", "unit quaternion"]);
+}
+
+#[test]
+fn suites_of_limbs_leave_rows_and_figures_and_are_kept() {
+    let folder = Folder::new("limbs");
+    let suite = include_str!("../suites/closed-form/reach.toml").replace("closed-form/reach", "mine/reach");
+    folder.write("mine.toml", &suite.replace("robot = \"hubo\"", "robot = \"nao\""));
+    folder.refuse(
+        &["run", "mine.toml", "--out", "out"],
+        &["mine.toml: study.reach.slices[0]", "nao/r_sole", "hubo/r_sole"],
+    );
+    folder.refuse(
+        &["run", "closed-form/reach", "--method", "ik1", "--out", "out"],
+        &["closed-form/reach", "--method"],
+    );
+    let run = [
+        "run",
+        "closed-form/reach",
+        "closed-form/continuity",
+        "--quick",
+        "--trace",
+        "--out",
+        "out",
+    ];
+    let shown = folder.succeed(&run);
+    assert!(
+        shown.contains("closed-form/reach") && !shown.contains("NO"),
+        "{shown}"
+    );
+    let rows = fs::read_to_string(folder.0.join("out/limbs.jsonl")).unwrap();
+    assert!(rows.lines().count() > 100 && !folder.0.join("out/runs.jsonl").exists());
+    let drawn = folder.succeed(&["figures", "out"]);
+    assert!(
+        drawn.contains("closed_form_errors.svg not drawn: no rows of closed-form/grid"),
+        "{drawn}"
+    );
+    for name in ["workspace", "continuity", "postures"] {
+        let svg = fs::read_to_string(folder.0.join(format!("out/figures/closed_form_{name}.svg"))).unwrap();
+        assert!(svg.contains("</svg>") && !svg.contains("NaN"), "{name}");
+    }
+    // Quick rows are made again, in place of the old ones.
+    folder.succeed(&run);
+    let again = fs::read_to_string(folder.0.join("out/limbs.jsonl")).unwrap();
+    assert_eq!(again, rows);
 }
 
 #[test]

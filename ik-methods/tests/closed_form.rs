@@ -475,3 +475,40 @@ fn no_threshold_costs_more_than_it_says() {
     }
     assert!(worst > 0.0);
 }
+
+/// HRP-2's offset makes K = 0 a double root, of which rounding leaves |K| ≈ 1e-8: at S2 = 0 it must not turn the hip.
+#[test]
+fn a_hip_beside_the_ankle_axis_stays_singular_in_rounded_poses() {
+    let mut numbers = Numbers(6);
+    for (name, leg) in legs().into_iter().filter(|(_, leg)| leg.hip_offset_m != 0.0) {
+        for i in 0..2_000 {
+            let mut q: [f64; 6] = numbers.joints();
+            q[1] = if i % 2 == 0 { 0.0 } else { PI };
+            q[4] = FRAC_PI_2 - (q[3].sin() * leg.thigh_m).atan2(q[3].cos() * leg.thigh_m + leg.shank_m);
+            let mut pose = leg.forward(&q);
+            pose.position += Vector3::from_fn(|_, _| 3e-16 * numbers.next());
+            let mut all = Solutions::default();
+            leg.solve_all(&pose, &q, &mut all).unwrap();
+            assert!(all.iter().all(|(s, _)| error(&leg.forward(s), &pose) < 2e-7));
+            assert!(all.iter().any(|(s, _)| distance(s, &q) < 1e-5), "{name}: {q:?}");
+        }
+    }
+}
+
+/// Equal links folded up, the shoulder at S2 = 0: θ1, θ3, θ5 and θ6 are free together.
+#[test]
+fn a_folded_arm_of_equal_links_does_not_jump() {
+    let (_, arm) = arms()[1];
+    assert_eq!(arm.upper_arm_m, arm.forearm_m);
+    let mut numbers = Numbers(7);
+    for i in 0..2_000 {
+        let mut q: [f64; 6] = numbers.joints();
+        (q[1], q[3]) = (if i % 2 == 0 { 0.0 } else { PI }, PI);
+        let previous = q.map(|q| q + 2e-3 * numbers.next());
+        let pose = arm.forward(&q);
+        let found = arm.solve_nearest(&pose, &previous).unwrap();
+        assert!(error(&arm.forward(&found), &pose) < 2e-7);
+        let away = distance(&found, &previous);
+        assert!(away < 1.2e-2, "{away} from {previous:?}: {found:?}");
+    }
+}

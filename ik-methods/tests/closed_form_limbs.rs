@@ -311,6 +311,14 @@ fn a_limb_is_told_with_its_bodies_joints_and_frames() {
     assert!(limb.frames.contains(&robot.frame("l_foot").unwrap()));
     assert_eq!(limbs(&robot)[0].side, Side::Right);
     assert_eq!(limbs(&embedded("pendulum").unwrap())[0].side, Side::Centre);
+    // At zero both legs of the humanoids of the source lie to the left.
+    for name in ["hubo", "hoap2", "hrp2", "asimo", "coman"] {
+        for limb in limbs(&embedded(name).unwrap()) {
+            let is_left = limb.tip_name.to_lowercase().starts_with('l');
+            let side = if is_left { Side::Left } else { Side::Right };
+            assert_eq!(limb.side, side, "{name} {}", limb.tip_name);
+        }
+    }
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! `ik-bench list`: what there is, from the registry, the embedded suites and the embedded robots.
 
 use super::Listed;
+use crate::limbs::LimbSuite;
 use crate::suite::Suite;
 use ik_core::robot::EMBEDDED;
 use ik_methods::registry::{Entry, METHODS};
@@ -46,6 +47,10 @@ fn suites(out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "{}: {}", suite.id, suite.title)?;
         let ids: Vec<&str> = suite.scenarios.iter().map(|s| s.id.as_str()).collect();
         writeln!(out, "    dt {} s; scenarios: {}", suite.dt_s, ids.join(", "))?;
+    }
+    for suite in LimbSuite::load_embedded().map_err(io::Error::other)? {
+        writeln!(out, "{}: {}", suite.id, suite.title)?;
+        writeln!(out, "    closed-form limbs, without control steps")?;
     }
     Ok(())
 }

@@ -4,6 +4,7 @@
 
 mod explain;
 mod failure;
+mod limbs;
 mod list;
 mod plan;
 mod progress;
@@ -12,6 +13,7 @@ mod solve;
 
 pub use failure::Failure;
 
+use crate::limbs::{LIMBS_FILE, read_limbs, replace_readme_limbs};
 use crate::records_io::{ROWS_FILE, RecordError, read_rows};
 use crate::suite::Variation;
 use crate::trajectory::Rates;
@@ -208,14 +210,18 @@ fn dispatch(cli: &Cli, out: &mut dyn Write) -> Result<(), Failure> {
         Some(Command::Solve(args)) => solve::solve(args, out),
         Some(Command::Figures { dir }) => draw(dir, out),
         Some(Command::Readme { dir, readme }) => {
-            let rows = rows_of(dir)?;
-            summary::replace_readme_table(readme, &rows)?;
-            Ok(writeln!(
-                out,
-                "{}: table of {} rows",
-                readme.display(),
-                rows.len()
-            )?)
+            let limbs = read_limbs(&dir.join(LIMBS_FILE))?;
+            // A folder of limb suites alone has no runs.
+            if limbs.is_empty() || dir.join(ROWS_FILE).exists() {
+                let rows = rows_of(dir)?;
+                summary::replace_readme_table(readme, &rows)?;
+                writeln!(out, "{}: table of {} rows", readme.display(), rows.len())?;
+            }
+            if !limbs.is_empty() {
+                replace_readme_limbs(readme, &limbs)?;
+                writeln!(out, "{}: table of {} limb rows", readme.display(), limbs.len())?;
+            }
+            Ok(())
         }
     }
 }

@@ -13,7 +13,15 @@ pub(super) struct Progress {
 
 impl Progress {
     pub(super) fn of_runs(runs: usize) -> Self {
-        let bar = ProgressBar::new(PASSES * runs as u64);
+        Self::of(PASSES * runs as u64)
+    }
+
+    pub(super) fn of_limbs(rows: usize) -> Self {
+        Self::of(rows as u64)
+    }
+
+    fn of(steps: u64) -> Self {
+        let bar = ProgressBar::new(steps);
         let style = ProgressStyle::with_template("{bar:30} {percent:>3} % {eta:>4} left  {msg}");
         bar.set_style(style.expect("the template is well formed"));
         Self { bar }
@@ -22,6 +30,11 @@ impl Progress {
     pub(super) fn pass_done(&self, case: &Case, contestant: &Contestant) {
         self.bar
             .set_message(format!("{} on {}/{}", contestant.id, case.suite, case.scenario));
+        self.bar.inc(1);
+    }
+
+    pub(super) fn limb_done(&self, label: &str) {
+        self.bar.set_message(label.to_owned());
         self.bar.inc(1);
     }
 

@@ -3,13 +3,15 @@
 //! A heat is one scenario with all its contestants; its rows and traces are written and dropped before the next begins,
 //! so memory does not grow with the number of scenarios and an interrupted session loses one heat at most.
 
+use super::limbs::{LimbRecorder, plans, run_limbs};
 use super::plan::{Heat, Scenarios, heats, settings};
 use super::progress::Progress;
 use super::{DEFAULT_FOLDER, EffortArgs, Everything, Failure, RunArgs, draw};
 use crate::error::InputError;
 use crate::instance::Instance;
+use crate::limbs::{Amount, LIMBS_FILE, LimbStore, LimbSuite, is_limb_suite, limbs_terminal};
 use crate::machine::{is_pinned, machine, revision};
-use crate::records::Row;
+use crate::records::{Machine, Row};
 use crate::records_io::{ROWS_FILE, RecordError, RowKey, RowStore, write_atomically, write_trace};
 use crate::runner::{Finished, Session, Timing, play, recorded, run_case};
 use crate::suite::{Case, Selection, Suite, Variation};
@@ -34,16 +36,19 @@ pub(super) fn everything(args: &Everything, out: &mut dyn Write) -> Result<(), F
         &Variation::default(),
         scenarios(args.effort),
     )?;
+    let limb_suites = LimbSuite::load_embedded()?;
+    let plans = plans(&limb_suites, amount(args.effort))?;
     let session = session(args.effort);
     check_folder(&args.out)?;
     let store = RowStore::open(&args.out)?;
-    let reusable = is_reusable(&store, &session);
+    let limbs = LimbStore::open(&args.out)?;
+    let reusable = is_reusable(&store, &limbs, &session);
     if !reusable && !args.effort.fresh && args.out != Path::new(DEFAULT_FOLDER) {
         let allowed = "a folder without rows, rows of this clean revision, or --fresh to start over";
         return Err(InputError::value("--out", "rows", args.out.display(), allowed).into());
     }
-    let store = if reusable && !args.effort.fresh {
-        store
+    let (store, limbs) = if reusable && !args.effort.fresh {
+        (store, limbs)
     } else {
         start_over(&args.out)?
     };
@@ -56,50 +61,86 @@ pub(super) fn everything(args: &Everything, out: &mut dyn Write) -> Result<(), F
         rows: Vec::new(),
     };
     run_heats(&heats, &session, &mut recorder)?;
-    let analysis: BTreeMap<String, String> = suites.into_iter().map(|s| (s.id, s.analysis)).collect();
-    let summary = summary::write_summary(&args.out, &recorder.rows, &analysis)?;
+    let mut limbs = LimbRecorder {
+        store: Some(limbs),
+        dir: args.out.clone(),
+        traces: Traces::Written,
+        reusable: limb_suites.iter().map(|s| s.id.clone()).collect(),
+        kept: 0,
+        rows: Vec::new(),
+    };
+    run_limbs(&plans, &session, &mut limbs)?;
+    let analysis = suites.into_iter().map(|s| (s.id, s.analysis));
+    let limb_analysis = limb_suites.into_iter().map(|s| (s.id, s.analysis));
+    let analysis: BTreeMap<String, String> = analysis.chain(limb_analysis).collect();
+    let summary = summary::write_summary(&args.out, &recorder.rows, &limbs.rows, &analysis)?;
     write!(out, "{}", summary::terminal_table(&recorder.rows))?;
+    write!(out, "{}", limbs_terminal(&limbs.rows))?;
     draw(&args.out, out)?;
-    recorder.tell_kept(out)?;
+    tell_kept(recorder.kept + limbs.kept, out)?;
     Ok(writeln!(
         out,
-        "{} rows in {}; {}",
+        "{} rows in {}, {} in {}; {}",
         recorder.rows.len(),
         args.out.join(ROWS_FILE).display(),
+        limbs.rows.len(),
+        args.out.join(LIMBS_FILE).display(),
         summary.display()
     )?)
 }
 
 /// Some suites; rows go to a folder if one is given.
 pub(super) fn run(args: &RunArgs, out: &mut dyn Write) -> Result<(), Failure> {
-    let suites: Vec<Suite> = args
-        .suites
+    let (limb_names, names): (Vec<String>, Vec<String>) =
+        args.suites.iter().cloned().partition(|name| is_limb_suite(name));
+    let suites: Vec<Suite> = names
         .iter()
         .map(|name| Suite::load(name))
         .collect::<Result<_, _>>()?;
-    let embedded: BTreeSet<String> = Suite::load_embedded()?.into_iter().map(|s| s.id).collect();
-    check_ids(&args.suites, &suites, &embedded)?;
+    let limb_suites: Vec<LimbSuite> = limb_names
+        .iter()
+        .map(|name| LimbSuite::load(name))
+        .collect::<Result<_, _>>()?;
+    let mut embedded: BTreeSet<String> = Suite::load_embedded()?.into_iter().map(|s| s.id).collect();
+    embedded.extend(LimbSuite::load_embedded()?.into_iter().map(|s| s.id));
+    let ids = suites.iter().map(|s| s.id.as_str());
+    let ids: Vec<&str> = ids.chain(limb_suites.iter().map(|s| s.id.as_str())).collect();
+    check_ids(
+        &names.iter().chain(&limb_names).collect::<Vec<_>>(),
+        &ids,
+        &embedded,
+    )?;
+    if suites.is_empty() {
+        check_options_of_limbs(args, &limb_names)?;
+    }
+    let plans = plans(&limb_suites, amount(args.effort))?;
     let selection = Selection {
         methods: args.methods.clone(),
         set: settings(&args.set)?,
     };
-    let heats = heats(&suites, &selection, &args.variation(), scenarios(args.effort))?;
+    // Without a suite of control steps there is nobody who could have a parameter.
+    let heats = if suites.is_empty() {
+        Vec::new()
+    } else {
+        heats(&suites, &selection, &args.variation(), scenarios(args.effort))?
+    };
     if let Some(k) = args.dump_step {
         heats.iter().try_for_each(|heat| check_step(&heat.case, k))?;
     }
     let session = session(args.effort);
-    let store = match &args.out {
+    let stores = match &args.out {
         Some(dir) => {
             check_folder(dir)?;
-            let store = RowStore::open(dir)?;
+            let stores = (RowStore::open(dir)?, LimbStore::open(dir)?);
             Some(if args.effort.fresh {
                 start_over(dir)?
             } else {
-                store
+                stores
             })
         }
         None => None,
     };
+    let (store, limb_store) = stores.unzip();
     let traces = if args.trace {
         Traces::Written
     } else {
@@ -108,6 +149,14 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write) -> Result<(), Failure> {
     let dir = args.out.clone().unwrap_or_default();
     let mut recorder = Recorder {
         store,
+        dir: dir.clone(),
+        traces,
+        reusable: embedded.clone(),
+        kept: 0,
+        rows: Vec::new(),
+    };
+    let mut limbs = LimbRecorder {
+        store: limb_store,
         dir,
         traces,
         reusable: embedded,
@@ -115,34 +164,51 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write) -> Result<(), Failure> {
         rows: Vec::new(),
     };
     run_heats(&heats, &session, &mut recorder)?;
+    run_limbs(&plans, &session, &mut limbs)?;
     if let Some(k) = args.dump_step {
         heats
             .iter()
             .try_for_each(|heat| dump_step(heat, k, &recorder.dir, out))?;
     }
     write!(out, "{}", summary::terminal_table(&recorder.rows))?;
-    Ok(recorder.tell_kept(out)?)
+    write!(out, "{}", limbs_terminal(&limbs.rows))?;
+    Ok(tell_kept(recorder.kept + limbs.kept, out)?)
+}
+
+/// What is said to the methods of a suite means nothing to a limb.
+fn check_options_of_limbs(args: &RunArgs, names: &[String]) -> Result<(), InputError> {
+    let given = [
+        ("--method", !args.methods.is_empty()),
+        ("--set", !args.set.is_empty()),
+        ("--dt", args.dt.is_some()),
+        ("--velocity", args.velocity.is_some()),
+        ("--margin", args.margin.is_some()),
+        ("--rates", args.rates.is_some()),
+        ("--dump-step", args.dump_step.is_some()),
+    ];
+    match given.iter().find(|(_, given)| *given) {
+        Some((option, _)) => {
+            let allowed = "none for suites of closed-form limbs, which have no control steps";
+            Err(InputError::value(&names.join(", "), option, "given", allowed))
+        }
+        None => Ok(()),
+    }
 }
 
 /// One session knows one suite by an id, and an embedded id means the embedded suite.
-fn check_ids(names: &[String], suites: &[Suite], embedded: &BTreeSet<String>) -> Result<(), InputError> {
-    for (i, (name, suite)) in names.iter().zip(suites).enumerate() {
-        let of_file = *name != suite.id;
-        if of_file && embedded.contains(&suite.id) {
+fn check_ids(names: &[&String], ids: &[&str], embedded: &BTreeSet<String>) -> Result<(), InputError> {
+    for (i, (name, id)) in names.iter().zip(ids).enumerate() {
+        let of_file = name != id;
+        if of_file && embedded.contains(*id) {
             return Err(InputError::value(
                 name,
                 "id",
-                &suite.id,
+                id,
                 "an id that no embedded suite has",
             ));
         }
-        if suites[..i].iter().any(|other| other.id == suite.id) {
-            return Err(InputError::value(
-                name,
-                "id",
-                &suite.id,
-                "each suite once in a session",
-            ));
+        if ids[..i].contains(id) {
+            return Err(InputError::value(name, "id", id, "each suite once in a session"));
         }
     }
     Ok(())
@@ -151,7 +217,8 @@ fn check_ids(names: &[String], suites: &[Suite], embedded: &BTreeSet<String>) ->
 /// A folder that holds our names without our rows is somebody else's. The default folder is ours, also where a session was
 /// interrupted before its first row.
 fn check_folder(dir: &Path) -> Result<(), InputError> {
-    if dir == Path::new(DEFAULT_FOLDER) || dir.join(ROWS_FILE).exists() {
+    if dir == Path::new(DEFAULT_FOLDER) || [ROWS_FILE, LIMBS_FILE].iter().any(|name| dir.join(name).exists())
+    {
         return Ok(());
     }
     match ["summary.md", "traces", "figures", "instances"]
@@ -179,6 +246,10 @@ fn scenarios(effort: EffortArgs) -> Scenarios {
     }
 }
 
+fn amount(effort: EffortArgs) -> Amount {
+    if effort.quick { Amount::Quick } else { Amount::Full }
+}
+
 fn session(effort: EffortArgs) -> Session {
     let (timing, notes) = if effort.quick {
         (Timing::QUICK, vec![QUICK_NOTE.to_owned()])
@@ -194,20 +265,26 @@ fn session(effort: EffortArgs) -> Session {
 }
 
 /// Rows can be built upon if this source made them on this machine with the same care.
-fn is_reusable(store: &RowStore, session: &Session) -> bool {
-    let same = |row: &Row| {
-        row.revision == session.revision && row.machine == session.machine && !is_quick(&row.notes)
+fn is_reusable(store: &RowStore, limbs: &LimbStore, session: &Session) -> bool {
+    let same = |revision: &str, machine: &Machine, notes: &[String]| {
+        revision == session.revision && *machine == session.machine && !is_quick(notes)
     };
-    store.rows().is_empty()
-        || (is_pinned(&session.revision) && !is_quick(&session.notes) && store.rows().iter().all(same))
+    let is_empty = store.rows().is_empty() && limbs.rows().is_empty();
+    let mut rows = store.rows().iter();
+    let mut limbs = limbs.rows().iter();
+    is_empty
+        || (is_pinned(&session.revision)
+            && !is_quick(&session.notes)
+            && rows.all(|row| same(&row.revision, &row.machine, &row.notes))
+            && limbs.all(|row| same(&row.revision, &row.machine, &row.notes)))
 }
 
-fn is_quick(notes: &[String]) -> bool {
+pub(super) fn is_quick(notes: &[String]) -> bool {
     notes.iter().any(|note| note == QUICK_NOTE)
 }
 
 /// Deletes what earlier sessions left in a results folder, and only that.
-fn start_over(dir: &Path) -> Result<RowStore, RecordError> {
+fn start_over(dir: &Path) -> Result<(RowStore, LimbStore), RecordError> {
     let gone = |path: PathBuf, removed: std::io::Result<()>| match removed {
         Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(RecordError::Io {
             path,
@@ -216,7 +293,7 @@ fn start_over(dir: &Path) -> Result<RowStore, RecordError> {
         }),
         _ => Ok(()),
     };
-    for file in [ROWS_FILE, "summary.md"].map(|name| dir.join(name)) {
+    for file in [ROWS_FILE, LIMBS_FILE, "summary.md"].map(|name| dir.join(name)) {
         let removed = fs::remove_file(&file);
         gone(file, removed)?;
     }
@@ -231,11 +308,11 @@ fn start_over(dir: &Path) -> Result<RowStore, RecordError> {
         // A folder that holds something else stays.
         let _ = fs::remove_dir(dir.join(folder));
     }
-    RowStore::open(dir)
+    Ok((RowStore::open(dir)?, LimbStore::open(dir)?))
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Traces {
+pub(super) enum Traces {
     Written,
     Dropped,
 }
@@ -287,16 +364,6 @@ impl Recorder {
             .cloned()
     }
 
-    fn tell_kept(&self, out: &mut dyn Write) -> std::io::Result<()> {
-        match self.kept {
-            0 => Ok(()),
-            kept => writeln!(
-                out,
-                "{kept} finished runs of this revision kept; --fresh makes them again"
-            ),
-        }
-    }
-
     /// Writes the traces of a heat in parallel, then its rows in order.
     fn record(&mut self, case: &Case, mut finished: Vec<Finished>) -> Result<Vec<Row>, RecordError> {
         if self.traces == Traces::Written {
@@ -323,6 +390,16 @@ impl Recorder {
         write_trace(&self.dir.join(&relative), &trace)?;
         run.row.trace = Some(relative);
         Ok(())
+    }
+}
+
+fn tell_kept(kept: usize, out: &mut dyn Write) -> std::io::Result<()> {
+    match kept {
+        0 => Ok(()),
+        kept => writeln!(
+            out,
+            "{kept} finished runs of this revision kept; --fresh makes them again"
+        ),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Figures of a results folder as SVG: those of Faraji & Ijspeert, "Singularity-tolerant inverse kinematics for bipedal
 //! robots: an efficient use of computational power to reduce energy consumption" (2017), those of Davies' method on the
-//! Bioloid (`davies_*`), those of the walks of Melson (`melson_*`), what comes of its chain on other robots (`walk_*`), and
-//! overviews over all suites.
+//! Bioloid (`davies_*`), those of the walks of Melson (`melson_*`), what comes of its chain on other robots (`walk_*`), those of
+//! closed-form limbs (`closed_form_*`), and overviews over all suites.
 //!
 //! Everything is drawn from the rows and traces of the folder, and from the embedded suites where a figure shows the
 //! robot, its mechanism or the knots of its walk: the same folder gives the same bytes. Where several rows of a suite differ in Δt, the figures show that of the last.
@@ -13,6 +13,7 @@ mod family;
 mod figure;
 pub(crate) mod labels;
 mod lean;
+mod limbs;
 mod mechanism;
 mod overview;
 mod painter;
@@ -27,6 +28,7 @@ mod tracking;
 mod walk;
 mod walked;
 
+use crate::limbs::LIMBS_FILE;
 use crate::records::{Row, Trace};
 use crate::records_io::{ROWS_FILE, RecordError, read_rows, read_trace, write_atomically};
 use labels::{Labelled, labelled};
@@ -100,7 +102,14 @@ pub struct Drawn {
 /// # Errors
 /// [`FigureError`]; figures drawn before the error stay.
 pub fn draw_all(dir: &Path, limits: &DrawnLimits) -> Result<Drawn, FigureError> {
-    let rows = of_last_dt(read_rows(&dir.join(ROWS_FILE))?.rows);
+    let file = dir.join(ROWS_FILE);
+    // A folder of limb suites alone has no runs.
+    let rows = if !file.exists() && dir.join(LIMBS_FILE).exists() {
+        Vec::new()
+    } else {
+        of_last_dt(read_rows(&file)?.rows)
+    };
+    let has_runs = !rows.is_empty();
     let runs = labelled(&rows);
     let styles = Styles::assign(runs.iter().map(|r| r.label.as_str()));
     let mut studio = Studio {
@@ -119,7 +128,9 @@ pub fn draw_all(dir: &Path, limits: &DrawnLimits) -> Result<Drawn, FigureError> 
                 files.push(path);
             }
             Err(Obstacle::NoData(reason)) => {
-                studio.notes.push(format!("{name} not drawn: {reason}"));
+                if has_runs {
+                    studio.notes.push(format!("{name} not drawn: {reason}"));
+                }
                 remove_stale(&path)?;
             }
             Err(Obstacle::Record(error)) => return Err(error.into()),
@@ -131,11 +142,12 @@ pub fn draw_all(dir: &Path, limits: &DrawnLimits) -> Result<Drawn, FigureError> 
             }
         }
     }
-
-    Ok(Drawn {
+    let mut drawn = Drawn {
         files,
         notes: studio.notes,
-    })
+    };
+    limbs::draw(dir, &mut drawn)?;
+    Ok(drawn)
 }
 
 fn remove_stale(path: &Path) -> Result<(), RecordError> {

@@ -7,6 +7,8 @@ use plotters::style::RGBColor;
 
 /// Font size of ticks and remarks.
 pub(super) const TICK_SIZE: f64 = 11.0;
+/// Room for a tick of an x axis, with a sign and two decimals.
+const TICK_ROOM: f64 = 42.0;
 
 /// A line over the panel.
 #[derive(Clone, Debug)]
@@ -150,7 +152,11 @@ impl Panel {
             let widened = axis.clone().with_range(middle - half, middle + half);
             widened.fit(&[], ticks)
         };
-        (around(&self.x, &x, width, 8), around(&self.y, &y, height, 6))
+        let fitting = ((width / TICK_ROOM) as usize).clamp(2, 8);
+        (
+            around(&self.x, &x, width, fitting),
+            around(&self.y, &y, height, 6),
+        )
     }
 }
 

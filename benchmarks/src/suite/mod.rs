@@ -255,7 +255,7 @@ impl Suite {
 }
 
 /// Ids become names of files.
-fn check_id(id: &str, field: &str, source: &str, also: &str) -> Result<(), InputError> {
+pub(crate) fn check_id(id: &str, field: &str, source: &str, also: &str) -> Result<(), InputError> {
     let good = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c) || also.contains(c);
     if !id.is_empty() && id.chars().all(good) {
         return Ok(());

@@ -218,7 +218,7 @@ fn the_readme_table_goes_between_its_markers() {
         text.contains(&readme_table(&rows)) && text.ends_with("\n\nEnd\n"),
         "{text}"
     );
-    let summary = write_summary(&dir, &rows, &BTreeMap::new()).unwrap();
+    let summary = write_summary(&dir, &rows, &[], &BTreeMap::new()).unwrap();
     assert_eq!(
         std::fs::read_to_string(summary).unwrap(),
         summary_markdown(&rows, &BTreeMap::new())

@@ -35,7 +35,7 @@ const SAME_AXIS_RAD: f64 = 1e-6;
 /// How far (m, rad) a limb may be from the pattern of a family, whose formulas leave out what is zero in it. Their poses
 /// are then within the 1e-10 asked of them.
 const PATTERN: f64 = 1e-11;
-/// A tip this near (m) to the plane of symmetry is on no side.
+/// A limb that begins this near (m) to the plane of symmetry is on no side.
 const CENTRE_M: f64 = 1e-6;
 /// Joints of a limb with a closed form for a pose.
 const JOINTS: usize = 6;
@@ -140,7 +140,7 @@ pub enum Verdict {
 /// One limb.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LimbReport {
-    /// Side of its tip.
+    /// Side of the robot on which it begins.
     pub side: Side,
     /// Indices of its joints in [`Robot::joints`], base to tip.
     pub joints: Vec<usize>,
@@ -255,11 +255,10 @@ fn chain(robot: &Robot, children: &[usize], tip: usize) -> Vec<usize> {
 
 fn report(robot: &Robot, zero: &ZeroPose<'_>, joints: Vec<usize>, tip: usize) -> LimbReport {
     let base = robot.joints()[joints[0]].parent;
-    // Joint i moves body i + 1.
-    let y = zero.lines()[tip - 1].point.y;
-    let side = match y {
-        _ if y > CENTRE_M => Side::Left,
-        _ if y < -CENTRE_M => Side::Right,
+    // Where the limb begins: at zero its tip may be anywhere, both soles of Hubo are to the left.
+    let side = match zero.lines()[joints[0]].point.y {
+        y if y > CENTRE_M => Side::Left,
+        y if y < -CENTRE_M => Side::Right,
         _ => Side::Centre,
     };
     let fixed_in_tip = |&FrameId(frame): &FrameId| robot.frames()[frame].body == tip;

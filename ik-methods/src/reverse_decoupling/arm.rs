@@ -3,7 +3,7 @@
 
 use super::{
     Inverted, LimbPose, REACH_TOLERANCE_M, STRAIGHT_TRIPLE, Solutions, Triple, TripleAngles, Unsolved,
-    branch_number, denavit_hartenberg, hinge, sign, wrap,
+    branch_number, denavit_hartenberg, distance, hinge, sign, wrap,
 };
 use nalgebra::Vector3;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -254,28 +254,54 @@ impl Arm {
         branch: ArmBranch,
         previous: &[f64; 6],
     ) -> [f64; 6] {
-        let Inverted { n, s, a, .. } = inverted;
-        let cosine4 = sign(elbow.cosine);
-        let fourth = if cosine4 > 0.0 { 0.0 } else { PI };
-        let (sixth, s6, c6) = elbow.sixth(0.0, self.upper_arm_m + self.forearm_m, previous[5]);
-        let across = |v: &Vector3<f64>| c6 * v.y + s6 * v.x;
-        let (gx, gy, cosine) = (across(n), across(s), -cosine4 * across(a));
-        let sine = gx.hypot(gy);
-        let s2 = branch.shoulder;
-        let second = (s2 * sine).atan2(cosine);
-        let (first, third) = if sine < STRAIGHT_TRIPLE {
-            (previous[0], previous[2])
+        let length = self.upper_arm_m + self.forearm_m;
+        let held = elbow.sixth(0.0, length, previous[5]);
+        let joints = straight_at(inverted, elbow, branch, previous, held);
+        // Equal links folded up leave θ6 free. Where some θ6 makes S2 = 0, staying on it may be nearer than holding θ6,
+        // which would have the shoulder leave S2 = 0 in a direction of its own.
+        let a = &inverted.a;
+        if elbow.across >= ON_WRIST_AXIS * length || a.z.abs() >= STRAIGHT_TRIPLE {
+            return joints;
+        }
+        let scale = sign(held.1 * a.x + held.2 * a.y) / a.x.hypot(a.y);
+        let (s6, c6) = (a.x * scale, a.y * scale);
+        let aligned = straight_at(inverted, elbow, branch, previous, (s6.atan2(c6), s6, c6));
+        if distance(&aligned, previous) < distance(&joints, previous) {
+            aligned
         } else {
-            ((s2 * cosine4 * gy).atan2(s2 * cosine4 * gx), previous[2])
-        };
-        let fifth = if sine < STRAIGHT_TRIPLE {
-            fifth_of_line(n, s, sign(cosine), cosine4, first, third)
-        } else {
-            let turn = (-s2 * a.z).atan2(s2 * cosine4 * (a.x * c6 - a.y * s6));
-            cosine4 * (third - turn)
-        };
-        [first, second, third, fourth, fifth, sixth].map(wrap)
+            joints
+        }
     }
+}
+
+/// [`Arm::straight`] with θ6, its sine and its cosine.
+fn straight_at(
+    inverted: &Inverted,
+    elbow: &Elbow,
+    branch: ArmBranch,
+    previous: &[f64; 6],
+    (sixth, s6, c6): (f64, f64, f64),
+) -> [f64; 6] {
+    let Inverted { n, s, a, .. } = inverted;
+    let cosine4 = sign(elbow.cosine);
+    let fourth = if cosine4 > 0.0 { 0.0 } else { PI };
+    let across = |v: &Vector3<f64>| c6 * v.y + s6 * v.x;
+    let (gx, gy, cosine) = (across(n), across(s), -cosine4 * across(a));
+    let sine = gx.hypot(gy);
+    let s2 = branch.shoulder;
+    let second = (s2 * sine).atan2(cosine);
+    let (first, third) = if sine < STRAIGHT_TRIPLE {
+        (previous[0], previous[2])
+    } else {
+        ((s2 * cosine4 * gy).atan2(s2 * cosine4 * gx), previous[2])
+    };
+    let fifth = if sine < STRAIGHT_TRIPLE {
+        fifth_of_line(n, s, sign(cosine), cosine4, first, third)
+    } else {
+        let turn = (-s2 * a.z).atan2(s2 * cosine4 * (a.x * c6 - a.y * s6));
+        cosine4 * (third - turn)
+    };
+    [first, second, third, fourth, fifth, sixth].map(wrap)
 }
 
 /// θ5 where shoulder and elbow are both singular: everything turns about one line.

@@ -49,7 +49,8 @@ impl LegBranch {
 }
 
 /// A hip centre this near the last axis, as part of the stretched leg, leaves θ6 free. The distance itself is compared,
-/// not its square, whose rounding would catch poses 1e-5 away.
+/// not its square, whose rounding would catch poses 1e-5 away. With an offset |K| is compared instead: below this it is the
+/// root of what rounding leaves of the pose, and the error of θ6, |K| / d3, would spread over a hip at S2 = 0.
 const ON_ANKLE_AXIS: f64 = 1e-7;
 /// Sines above this are of distinct branches.
 const MERGING: f64 = 1e-5;
@@ -180,9 +181,10 @@ impl Leg {
                 largest_m: f64::INFINITY,
             });
         }
-        let k = ((across - d3.abs()).max(0.0) * (across + d3.abs())).sqrt();
-        let knee = hinge(l3, l4, k.hypot(p.z)).map_err(|unsolved| with_offset(unsolved, d3))?;
         let near = ON_ANKLE_AXIS * (l3 + l4);
+        let k = ((across - d3.abs()).max(0.0) * (across + d3.abs())).sqrt();
+        let k = if k < near { 0.0 } else { k };
+        let knee = hinge(l3, l4, k.hypot(p.z)).map_err(|unsolved| with_offset(unsolved, d3))?;
         Ok(Shared {
             x,
             across,

@@ -95,27 +95,33 @@ fn runs_of_another_or_a_dirty_revision_are_repeated() {
 #[test]
 fn only_rows_of_this_clean_revision_and_machine_made_with_care_can_be_built_upon() {
     let folder = Folder::new("reuse");
+    let limbs = LimbStore::open(&folder.0).unwrap();
     let session = session_at("0123456789ab");
     assert!(
-        is_reusable(&RowStore::open(&folder.0).unwrap(), &session_at("unknown")),
+        is_reusable(
+            &RowStore::open(&folder.0).unwrap(),
+            &limbs,
+            &session_at("unknown")
+        ),
         "an empty folder"
     );
     rows_after(&folder.0, &session);
     let store = RowStore::open(&folder.0).unwrap();
-    assert!(is_reusable(&store, &session));
-    assert!(!is_reusable(&store, &session_at("0123456789ab-dirty")));
-    assert!(!is_reusable(&store, &session_at("ba9876543210")));
+    assert!(is_reusable(&store, &limbs, &session));
+    assert!(!is_reusable(&store, &limbs, &session_at("0123456789ab-dirty")));
+    assert!(!is_reusable(&store, &limbs, &session_at("ba9876543210")));
     let quick = Session {
         notes: vec![QUICK_NOTE.to_owned()],
         ..session.clone()
     };
-    assert!(!is_reusable(&store, &quick));
+    assert!(!is_reusable(&store, &limbs, &quick));
     let elsewhere = crate::records::Machine {
         cores: 99,
         ..session.machine.clone()
     };
     assert!(!is_reusable(
         &store,
+        &limbs,
         &Session {
             machine: elsewhere,
             ..session
@@ -128,13 +134,13 @@ fn starting_over_removes_results_and_nothing_else() {
     let folder = Folder::new("fresh");
     rows_after(&folder.0, &session_at("0123456789ab"));
     fs::write(folder.0.join("notes.txt"), "mine").unwrap();
-    assert!(start_over(&folder.0).unwrap().rows().is_empty());
+    assert!(start_over(&folder.0).unwrap().0.rows().is_empty());
     let left: Vec<_> = fs::read_dir(&folder.0)
         .unwrap()
         .map(|e| e.unwrap().file_name())
         .collect();
     assert_eq!(left, ["notes.txt"]);
-    assert!(start_over(&folder.0.join("nowhere")).unwrap().rows().is_empty());
+    assert!(start_over(&folder.0.join("nowhere")).unwrap().0.rows().is_empty());
 }
 
 #[test]

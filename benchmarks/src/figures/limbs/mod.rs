@@ -1,0 +1,85 @@
+//! Figures of the limb suites (`closed_form_*`), from the limb rows of a folder and the traces that belong to them.
+
+mod continuity;
+mod errors;
+mod postures;
+mod workspace;
+
+use super::style::{BLUE, Dash, GREEN, Marker, ORANGE, PURPLE, Style, VERMILLION};
+use super::{Drawn, FigureError, Obstacle, remove_stale};
+use crate::limbs::{Findings, LIMBS_FILE, LimbRow, read_limbs};
+use crate::records_io::write_atomically;
+use std::path::Path;
+
+type Paint = fn(&Limbs<'_>) -> Result<String, Obstacle>;
+
+const FIGURES: [(&str, Paint); 4] = [
+    ("closed_form_errors.svg", errors::errors),
+    ("closed_form_workspace.svg", workspace::workspace),
+    ("closed_form_continuity.svg", continuity::continuity),
+    ("closed_form_postures.svg", postures::postures),
+];
+
+/// What the figures are drawn from.
+struct Limbs<'a> {
+    dir: &'a Path,
+    rows: Vec<LimbRow>,
+}
+
+impl Limbs<'_> {
+    /// The row of a set on a limb that is described by its robot and the beginning of its family.
+    fn row(&self, robot: &str, family: &str, set: &str) -> Option<&LimbRow> {
+        let here = |row: &&LimbRow| row.robot == robot && row.family.starts_with(family) && row.set == set;
+        self.rows.iter().filter(here).find(|row| row.side == "right")
+    }
+
+    fn found<'a, T>(&'a self, of: impl Fn(&'a Findings) -> Option<&'a T>) -> Vec<(&'a LimbRow, &'a T)> {
+        let pair = |row: &'a LimbRow| of(&row.found).map(|found| (row, found));
+        self.rows.iter().filter_map(pair).collect()
+    }
+}
+
+/// Draws the figures of limbs beside those of the runs. A folder without limb rows has none, which is not worth a note.
+pub(super) fn draw(dir: &Path, drawn: &mut Drawn) -> Result<(), FigureError> {
+    let rows = read_limbs(&dir.join(LIMBS_FILE))?;
+    let has_rows = !rows.is_empty();
+    let limbs = Limbs { dir, rows };
+    for (name, paint) in FIGURES {
+        let path = dir.join("figures").join(name);
+        match paint(&limbs) {
+            Ok(svg) => {
+                write_atomically(&path, &svg)?;
+                drawn.files.push(path);
+            }
+            Err(Obstacle::NoData(reason)) => {
+                if has_rows {
+                    drawn.notes.push(format!("{name} not drawn: {reason}"));
+                }
+                remove_stale(&path)?;
+            }
+            Err(Obstacle::Record(error)) => return Err(error.into()),
+            Err(Obstacle::Draw(reason)) => {
+                return Err(FigureError::Draw {
+                    figure: name.to_owned(),
+                    reason,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Name and look of a family of limbs.
+fn family(row: &LimbRow) -> (&'static str, Style) {
+    let look = |colour, dash, marker| Style { colour, dash, marker };
+    match row.family.as_str() {
+        "leg of the paper" => ("legs", look(BLUE, Dash::Solid, Marker::Circle)),
+        "arm of the paper" => ("arms", look(VERMILLION, Dash::Long, Marker::Square)),
+        "arm of four joints" => ("arms of four joints", look(GREEN, Dash::Short, Marker::Triangle)),
+        name if name.ends_with("quartic") => ("general, quartic", look(ORANGE, Dash::Dotted, Marker::Ring)),
+        _ => (
+            "general, two quadratics",
+            look(PURPLE, Dash::Dotted, Marker::Diamond),
+        ),
+    }
+}
