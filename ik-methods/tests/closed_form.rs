@@ -496,6 +496,43 @@ fn a_hip_beside_the_ankle_axis_stays_singular_in_rounded_poses() {
 }
 
 /// Equal links folded up, the shoulder at S2 = 0: θ1, θ3, θ5 and θ6 are free together.
+/// An offset that is rounding of a model: on the ankle's axis its products vanish.
+#[test]
+fn a_hip_on_the_ankle_axis_is_solved_with_the_smallest_offsets() {
+    let mut numbers = Numbers(12);
+    for hip_offset_m in [1e-13, 1e-10, 9e-10] {
+        let leg = Leg {
+            thigh_m: 0.3,
+            shank_m: 0.29,
+            ankle_m: 0.1,
+            hip_offset_m,
+        };
+        for _ in 0..200 {
+            let mut q: [f64; 6] = numbers.joints();
+            // K = 0.
+            let (s, c) = q[3].sin_cos();
+            q[4] = (leg.thigh_m * c + leg.shank_m).atan2(leg.thigh_m * s);
+            let pose = leg.forward(&q);
+            // The same with the hip exactly on the axis.
+            let rotation = pose.rotation;
+            let on_axis = LimbPose {
+                position: -(rotation * Vector3::new(-leg.ankle_m, 0.0, seen(&pose, leg.ankle_m).z)),
+                ..pose
+            };
+            for pose in [pose, on_axis] {
+                let mut all = Solutions::default();
+                leg.solve_all(&pose, &q, &mut all).unwrap();
+                for (solution, _) in all.iter() {
+                    let off = error(&leg.forward(solution), &pose);
+                    assert!(off < 2e-7, "{hip_offset_m:e}: {off:e} {solution:?}");
+                }
+                let found = all.iter().any(|(s, _)| distance(s, &q) < 1e-5);
+                assert!(found, "{hip_offset_m:e}: {q:?}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_folded_arm_of_equal_links_does_not_jump() {
     let (_, arm) = arms()[1];

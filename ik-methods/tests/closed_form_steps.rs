@@ -437,3 +437,76 @@ fn three_joints_place_a_point() {
         );
     }
 }
+
+/// Hubo with its right shoulder 0.1 rad outside its limits.
+fn with_a_shoulder_outside() -> (Arc<Robot>, usize) {
+    let wide = Limits {
+        lower: -3.1,
+        upper: 3.1,
+        velocity: 100.0,
+        effort: 1.0,
+    };
+    let robot = all_limited(&embedded("hubo").unwrap(), wide);
+    let shoulder = robot.coordinate("r_arm_2").unwrap();
+    let lower = bent(&robot, 0, 0.0)[7 + shoulder] + 0.1;
+    let robot = robot.with_limits("r_arm_2", Limits { lower, ..wide }).unwrap();
+    (Arc::new(robot), 7 + shoulder)
+}
+
+#[test]
+fn the_centre_of_mass_is_met_while_an_idle_joint_returns_to_its_limits() {
+    let (robot, shoulder) = with_a_shoulder_outside();
+    let start = bent(&robot, 0, 0.0);
+    let fixture = fixture(&balanced(&robot)[..4], &robot, start, |parts| {
+        parts.boundary = Boundary::Box;
+    });
+    let mut driver = fixture.driver("closed-form", "");
+    let mut x = fixture.target.clone();
+    x[0] += 0.005;
+    let (termination, _) = fixture.step(&mut driver, &fixture.start, &x, &[]);
+    assert_eq!(termination, Termination::Converged);
+    let q = &driver.solution().q;
+    assert!((q[shoulder] - fixture.start[shoulder] - 0.1).abs() < 1e-12);
+    assert!(missed(&fixture.problem, &x, q) < 1e-9);
+}
+
+#[test]
+fn joints_return_to_their_limits_also_where_a_hard_hand_is_out_of_reach() {
+    let (robot, shoulder) = with_a_shoulder_outside();
+    let start = bent(&robot, 0, 0.0);
+    let fixture = fixture(&placed(&robot), &robot, start, |parts| {
+        parts.boundary = Boundary::Box;
+    });
+    let mut driver = fixture.driver("closed-form", "");
+    assert!(driver.honours().boundary);
+    let mut x = fixture.target.clone();
+    x[fixture.problem.slots()[4].x] += 1.0;
+    let (termination, _) = fixture.step(&mut driver, &fixture.start, &x, &[]);
+    assert!(
+        matches!(termination, Termination::OutOfReach { .. }),
+        "{termination:?}"
+    );
+    let q = &driver.solution().q;
+    assert!((q[shoulder] - fixture.start[shoulder] - 0.1).abs() < 1e-12);
+}
+
+#[test]
+fn an_orientation_target_that_is_no_rotation_is_refused_as_such() {
+    let robot = Arc::new(embedded("hubo").unwrap());
+    let start = bent(&robot, 0, 0.0);
+    let fixture = fixture(&balanced(&robot), &robot, start, |_| {});
+    let mut driver = fixture.driver("closed-form", "");
+    for turn in [1, 2, 5] {
+        let slot = fixture.problem.slots()[turn].x + if turn == 1 { 0 } else { 3 };
+        for w in [0.0, 1e-200, 1e200] {
+            let mut x = fixture.target.clone();
+            x[slot..slot + 4].copy_from_slice(&[0.0, 0.0, 0.0, w]);
+            let (termination, _) = fixture.step(&mut driver, &fixture.start, &x, &[]);
+            assert!(
+                matches!(termination, Termination::Numerical(_)),
+                "{turn} {w:e}: {termination:?}"
+            );
+            assert_eq!(driver.solution().q, fixture.start);
+        }
+    }
+}

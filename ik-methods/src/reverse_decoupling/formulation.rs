@@ -140,14 +140,18 @@ impl Stepper for ReverseDecouplingStepper {
         if !step.targets.now().x.iter().all(|x| x.is_finite()) {
             return Termination::Numerical("a target is not finite");
         }
+        let plan = &self.plans[step.phase.0];
+        if !plan.has_rotations(step.targets.now().x) {
+            return Termination::Numerical("an orientation target is no rotation");
+        }
         let robot = self.problem.robot();
-        let one = Step::new(robot, &self.plans[step.phase.0], step);
+        let one = Step::new(robot, plan, step);
         let termination = one.solve(&mut self.work, eval);
         let best = &self.work.best;
-        if best.merit.missing_m > 0.0 {
-            return termination;
+        // Without a configuration the robot stays, but for what the intervals force.
+        if best.merit.missing_m == 0.0 {
+            out.q.copy_from_slice(&best.q);
         }
-        out.q.copy_from_slice(&best.q);
         let first = robot.root();
         for (i, q) in out.q[first.nq()..].iter_mut().enumerate() {
             let v = first.nv() + i;

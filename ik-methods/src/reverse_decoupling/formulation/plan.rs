@@ -13,6 +13,9 @@ use ik_core::spatial::{rpy, so3};
 use ik_core::task::{OrientationCoordinates, Priority, Track};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
+/// Quaternions of targets further from unit length than this are no rotations.
+const UNIT_TOLERANCE: f64 = 1e-6;
+
 /// Where an orientation target stands, and how its frame is turned in its body.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Attitude {
@@ -22,6 +25,19 @@ pub(super) struct Attitude {
 }
 
 impl Attitude {
+    /// Whether the numbers are a rotation, up to the length of a quaternion.
+    fn is_rotation(&self, x: &[f64]) -> bool {
+        let length = || {
+            x[self.x..self.x + 4]
+                .iter()
+                .fold(0.0, |length: f64, c| length.hypot(*c))
+        };
+        match self.coordinates {
+            OrientationCoordinates::RollPitchYaw => true,
+            OrientationCoordinates::Log => (length() - 1.0).abs() < UNIT_TOLERANCE,
+        }
+    }
+
     /// Rotation of the body.
     pub(super) fn of_body(&self, x: &[f64]) -> UnitQuaternion<f64> {
         let numbers = &x[self.x..];
@@ -166,6 +182,19 @@ impl Plan {
             limbs: plans,
             idle,
         })
+    }
+
+    /// Whether all orientation targets are rotations.
+    pub(super) fn has_rotations(&self, x: &[f64]) -> bool {
+        let waist = match &self.waist {
+            Waist::Fixed => true,
+            Waist::Prescribed(attitude, _) | Waist::Balanced(attitude, _) => attitude.is_rotation(x),
+        };
+        let of_limb = |limb: &LimbPlan| match &limb.target {
+            Target::Pose(attitude, _) => attitude.is_rotation(x),
+            Target::Point(_) => true,
+        };
+        waist && self.limbs.iter().all(of_limb)
     }
 
     /// Remarks on what is left out.

@@ -184,6 +184,12 @@ impl<'a> Step<'a> {
                 *to = if same_side { *c } else { -c };
             }
         }
+        // Joints that rest still move into their intervals, and the centre of mass with them.
+        let (root_nq, root_nv) = (self.robot.root().nq(), self.robot.root().nv());
+        let Bounds { lo, hi, .. } = self.step.bounds;
+        for (i, q) in out.q[root_nq..].iter_mut().enumerate() {
+            *q += 0.0_f64.clamp(lo[root_nv + i], hi[root_nv + i]);
+        }
         let root = Isometry3::from_parts(Translation3::from(origin), self.rotation);
         for (plan, target) in self.plan.limbs.iter().zip(targets) {
             self.limb(plan, &root.inv_mul(target), out);
