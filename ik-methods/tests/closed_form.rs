@@ -549,3 +549,37 @@ fn a_folded_arm_of_equal_links_does_not_jump() {
         assert!(away < 1.2e-2, "{away} from {previous:?}: {found:?}");
     }
 }
+
+/// Just beside a stretched elbow, where rounding of the sine needs some slack, no solution misses its pose by more than 2e-7.
+#[test]
+fn a_nearly_stretched_arm_gives_no_solution_that_misses() {
+    let mut accepted = 0;
+    for (name, arm) in arms() {
+        let (l2, l3) = (arm.upper_arm_m, arm.forearm_m);
+        for elbow in [0.0, 1e-7, 2e-7, 3e-7, 4e-7, 4.9e-7, 5.1e-7, 6e-7_f64] {
+            for beyond in [1e-9, 1e-8, 3e-8, 1e-7, 1.2e-7, 2e-7] {
+                let z = l2 * elbow.sin() + beyond;
+                let across = ((l2 + l3 * elbow.cos()).powi(2) + (l3 * elbow.sin()).powi(2) - z * z).sqrt();
+                let turn = 1e6 * elbow + 1e7 * beyond;
+                let seen = Vector3::new(across * turn.cos() - arm.hand_m, across * turn.sin(), z);
+                let rotation = *nalgebra::Rotation3::from_euler_angles(0.3 + turn, -0.8, 1.1 * turn).matrix();
+                let pose = LimbPose {
+                    rotation,
+                    position: -(rotation * seen),
+                };
+                let mut all = Solutions::default();
+                if arm.solve_all(&pose, &[0.2; 6], &mut all).is_ok() {
+                    accepted += 1;
+                    for (q, _) in all.iter() {
+                        let found = arm.forward(q);
+                        let off = (found.rotation - rotation)
+                            .amax()
+                            .max((found.position - pose.position).amax());
+                        assert!(off < 2e-7, "{name} {elbow:e} {beyond:e}: {off:e}");
+                    }
+                }
+            }
+        }
+    }
+    assert!(accepted > 10, "{accepted}");
+}

@@ -113,8 +113,8 @@ impl Formulation for ReverseDecoupling {
             majors: if iterates { self.parameters.n } else { 1 },
             honours: Honours {
                 boundary: true,
-                // The waist gives way to limits by a local search, which may miss a place where all limbs reach.
-                hard_rows: !iterates,
+                // Of several joints that a singularity leaves free one gives way to limits, and the waist by a local search.
+                hard_rows: false,
                 objective: Use::Ignored,
                 allocation_free: true,
                 counts: Trust::Metered,

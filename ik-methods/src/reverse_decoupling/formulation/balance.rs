@@ -2,7 +2,7 @@
 
 use super::plan::Target;
 use super::rates::{centre_of_mass_rate, is_regular, joint_rates};
-use super::region::{Halfspace, Reach, Region};
+use super::region::{Halfspace, Reach, Region, Ring};
 use super::whole_body::{Candidate, OUTSIDE_RAD, Step, Work, conclude, root_pose};
 use ik_core::evaluator::Evaluator;
 use ik_core::formulation::Termination;
@@ -44,7 +44,7 @@ impl Step<'_> {
         start.q.copy_from_slice(self.step.q_prev);
         start.merit.away = centre - start.page.centre_of_mass();
         let ahead = work.best.merit.away;
-        let (newton, _) = self.next(Way::Along, &work.best, &work.region);
+        let (newton, _) = self.next(Way::Along, &work.best, &mut work.region);
         for length in FIRST_LENGTHS {
             let guess = length.map_or(newton, |part| work.region.nearest(&(before + ahead * part)));
             self.evaluate(guess, centre, work, eval);
@@ -79,7 +79,7 @@ impl Step<'_> {
     /// Heuristic: next to a straight leg D is dominated by how fast its knee bends, and Newton steps that lead out of the
     /// region throw the waist about (measured, they lose coman/asymmetric). There the waist first tries to go with the centre
     /// of mass to the nearest point of the region.
-    fn next(&self, way: Way, from: &Candidate, region: &Region) -> (Vector3<f64>, Vector3<f64>) {
+    fn next(&self, way: Way, from: &Candidate, region: &mut Region) -> (Vector3<f64>, Vector3<f64>) {
         let (origin, away) = (from.origin, from.merit.away);
         let along = || {
             let target = region.nearest(&(origin + away));
@@ -114,7 +114,7 @@ impl Step<'_> {
             let mut cuts = 0;
             loop {
                 let (target, predicted) = if merit.stands() {
-                    self.next(way, &work.best, &work.region)
+                    self.next(way, &work.best, &mut work.region)
                 } else {
                     (work.region.nearest(&from), Vector3::zeros())
                 };
@@ -166,7 +166,7 @@ impl Step<'_> {
         }
     }
 
-    /// The shells of hard limbs within the intervals of their hinges.
+    /// The shells of hard limbs within the intervals of their hinges, and the rings of arms.
     fn fill_region(&self, work: &mut Work) {
         work.region.clear();
         let first = self.robot.root();
@@ -182,12 +182,22 @@ impl Step<'_> {
                 Target::Pose(..) => target * shell.tip_point,
                 Target::Point(_) => target.translation.vector.into(),
             };
+            let arm = self.rotation * shell.base_point.coords;
             work.region.add(Reach {
-                arm: self.rotation * shell.base_point.coords,
+                arm,
                 centre: end.coords,
                 least_m,
                 largest_m,
             });
+            if let Some((axis, forearm_m, upper_arm_m)) = plan.ring {
+                work.region.add_ring(Ring {
+                    arm,
+                    wrist: end.coords,
+                    axis: target.rotation * axis,
+                    forearm_m,
+                    upper_arm_m,
+                });
+            }
         }
     }
 

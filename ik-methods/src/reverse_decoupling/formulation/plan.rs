@@ -118,6 +118,8 @@ pub(super) struct LimbPlan {
     /// The three axes that meet, of a limb that takes a pose: at which end, and where, in the root or in the last body (m).
     pub(super) triple: (End, Point3<f64>),
     pub(super) shell: Option<Shell>,
+    /// Of an arm of the paper: its last axis in the last body (unit), and the lengths of forearm and upper arm (m).
+    pub(super) ring: Option<(Vector3<f64>, f64, f64)>,
     pub(super) is_hard: bool,
 }
 
@@ -330,7 +332,7 @@ fn limb_plan(
             "an orientation alone does not fix the joints of the limb at `{name}`"
         )));
     };
-    let plan = |limb, target, triple, shell| LimbPlan {
+    let plan = |limb, target, triple, shell, ring| LimbPlan {
         limb,
         target,
         tip: body,
@@ -339,6 +341,7 @@ fn limb_plan(
         coordinates,
         triple,
         shell,
+        ring,
         is_hard: asked.is_hard,
     };
     if let Some(attitude) = asked.orientation {
@@ -357,12 +360,23 @@ fn limb_plan(
             Family::FourJointArm => None,
             _ => Shell::of(robot, &report.joints, &table, end),
         };
-        Ok(plan(limb, Target::Pose(attitude, place), (end, triple), shell))
+        let last_axis = tip.inverse_transform_vector(&lines[lines.len() - 1].axis);
+        let ring = match family {
+            Family::Arm => Some((last_axis, table.rows[4].d.abs(), table.rows[2].d.abs())),
+            _ => None,
+        };
+        Ok(plan(
+            limb,
+            Target::Pose(attitude, place),
+            (end, triple),
+            shell,
+            ring,
+        ))
     } else {
         let point = place.in_body;
         let limb = Limb::placing(robot, report, &point).map_err(|e| declined(e.to_string()))?;
         let table = with_virtual_wrist(robot, report, &point);
         let shell = table.and_then(|table| Shell::of_point(robot, &report.joints, &table, &point));
-        Ok(plan(limb, Target::Point(place), (End::Tip, point), shell))
+        Ok(plan(limb, Target::Point(place), (End::Tip, point), shell, None))
     }
 }
