@@ -230,7 +230,10 @@ fn bad_instances_and_folders_are_refused() {
     let broken = folder.write("broken.json", "{\"schema\": \"ik-bench/instance/1\", ");
     folder.refuse(&["solve", &broken], &["broken.json", "line 1 column"]);
     let nan = folder.write("nan.json", "{\"schema\": NaN}");
-    folder.refuse(&["solve", &nan], &["nan.json", "line 1 column"]);
+    folder.refuse(
+        &["solve", &nan],
+        &["nan.json", "not a number at line 1 column 12"],
+    );
     folder.refuse(&["figures", "nowhere"], &["nowhere"]);
     folder.refuse(&["readme", "nowhere", "README.md"], &["nowhere"]);
     folder.refuse(&["list", "animals"], &["animals", "methods"]);
