@@ -333,7 +333,41 @@ fn a_limb_takes_a_pose_in_all_its_postures() {
     folder.refuse(&["solve", &path], &["previous", "l_leg_4", "r_leg_4"]);
     let skewed = file("r_sole", -0.7, "").replace("[0.0, 0.0, 0.0, 1.0]", "[0.0, 0.3, 0.0, 1.0]");
     let path = folder.write("bad.json", &skewed);
-    folder.refuse(&["solve", &path], &["rotation_xyzw", "unit quaternion"]);
+    folder.refuse(&["solve", &path], &["rotation_xyzw", "unit quaternion", "1e-6"]);
+}
+
+#[test]
+fn a_file_to_solve_is_judged_by_the_schema_it_names() {
+    let folder = Folder::new("schema");
+    let good = "{\"schema\": \"ik-bench/limb-pose/1\",\n \"robot\": {\"embedded\": \"hubo\"}, \"frame\": \"r_sole\",\n \
+                \"position_m\": [0.05, -0.1, -0.7],\n \"rotation_xyzw\": [0.0, 0.0, 0.0, 1.0],\n \
+                \"previous\": {\"r_leg_4\": 1.0}}";
+    folder.succeed(&["solve", &folder.write("good.json", good)]);
+    let refuse = |from: &str, to: &str, words: &[&str]| {
+        assert!(good.contains(from), "{from}");
+        let path = folder.write("bad.json", &good.replacen(from, to, 1));
+        folder.refuse(&["solve", &path], &[&["bad.json"], words].concat());
+    };
+    refuse("-0.1", "NaN", &["not a number at line 3 column"]);
+    refuse("-0.1", "-Infinity", &["line 3 column"]);
+    refuse("-0.1", "1e999", &["number out of range at line 3 column"]);
+    refuse(
+        "\"r_leg_4\": 1.0",
+        "\"r_leg_4\": NaN",
+        &["not a number at line 5"],
+    );
+    let both = "allowed: ik-bench/instance/1, ik-bench/limb-pose/1";
+    refuse(
+        "limb-pose/1",
+        "limb-pose/2",
+        &["schema = \"ik-bench/limb-pose/2\"", both],
+    );
+    refuse(
+        "\"schema\": \"ik-bench/limb-pose/1\",",
+        "",
+        &["schema = missing", both],
+    );
+    refuse("\"frame\"", "\"fram\"", &["unknown field `fram`", "`frame`"]);
 }
 
 #[test]

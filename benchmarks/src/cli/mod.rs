@@ -153,7 +153,7 @@ struct SolveArgs {
     /// Parameter of the method; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// All solutions of a limb's pose, not the nearest alone
+    /// All solutions of a limb's pose, not the nearest alone (of those within limits if there is one)
     #[arg(long, conflicts_with_all = ["method", "set"])]
     all_solutions: bool,
 }

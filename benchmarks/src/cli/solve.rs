@@ -58,10 +58,12 @@ fn solve_limb(args: &SolveArgs, text: &str, source: &str, out: &mut dyn Write) -
         let allowed = "neither --method nor --set: a limb's pose has a closed form";
         return Err(InputError::value(source, "--method or --set", "given", allowed).into());
     }
-    let mut answer = LimbPoseFile::parse(text, source)?.solve(source)?;
-    if !args.all_solutions {
-        answer.solutions.truncate(1);
-    }
+    let answer = LimbPoseFile::parse(text, source)?.solve(source)?;
+    let answer = if args.all_solutions {
+        answer
+    } else {
+        answer.nearest()
+    };
     print(&answer, out)
 }
 
