@@ -94,6 +94,21 @@ fn unknown_names_are_refused() {
         &["run", "coman/squad"],
         &["suite `coman/squad`", "did you mean `coman/squat`?", "coman/lean"],
     );
+    refuse(
+        &["run", "closed-form/gird"],
+        &["did you mean `closed-form/grid`?", "coman/lean"],
+    );
+    refuse(
+        &["run", "closed-form"],
+        &[
+            "suite = closed-form",
+            "this group: closed-form/grid, closed-form/continuity",
+        ],
+    );
+    refuse(
+        &["run", "coman/"],
+        &["suite = coman/", "this group: coman/squat, coman/stretch"],
+    );
     refuse(&["run", "nowhere.toml"], &["nowhere.toml", "cannot be read"]);
     refuse(
         &["run", "coman/squat", "--method", "ik44"],
