@@ -299,6 +299,27 @@ fn methods_are_explained() {
         "{limbs}"
     );
     assert_eq!(limbs.matches("theta = q +90.000 deg").count(), 2, "{limbs}");
+    assert_eq!(
+        folder.succeed(&["explain", "closed-form", "--robot", "hrp2"]),
+        limbs
+    );
+    let urdf = "<robot name='post'><link name='a'/><link name='b'/><joint name='turn' type='continuous'>\
+                <parent link='a'/><child link='b'/><axis xyz='0 0 1'/></joint></robot>";
+    folder.write("post.urdf", urdf);
+    let post = folder.succeed(&["explain", "closed-form", "--robot", "post.urdf"]);
+    assert!(
+        post.contains("limbs of post") && post.contains("fewer than six joints"),
+        "{post}"
+    );
+    folder.refuse(&["explain", "closed-form", "--robot", "no.urdf"], &["no.urdf"]);
+    folder.refuse(
+        &["explain", "closed-form", "--robot", "hubo", "--svg", "out.svg"],
+        &["--svg = out.svg", "davies"],
+    );
+    folder.refuse(
+        &["explain", "closed-form", "--suite", "closed-form/grid"],
+        &["--suite = closed-form/grid", "--robot"],
+    );
     folder.refuse(&["explain", "ik4", "--robot", "bioloid"], &["ik4", "davies"]);
     folder.refuse(&["explain", "davies", "--robot", "arm7"], &["arm7", "bioloid"]);
     folder.refuse(
