@@ -415,6 +415,17 @@ fn suites_of_limbs_leave_rows_and_figures_and_are_kept() {
         &["run", "mine.toml", "--out", "out"],
         &["mine.toml: study.reach.slices[0]", "nao/r_sole", "hubo/r_sole"],
     );
+    for (from, to, words) in [
+        ("study.reach", "stduy.reach", ["unknown field `stduy`", "`study`"]),
+        ("robots = [", "robot = [", ["unknown field `robot`", "`robots`"]),
+        ("robots = [", "limbs = [", ["unknown field `limbs`", "`robots`"]),
+    ] {
+        folder.write("typo.toml", &suite.replace(from, to));
+        folder.refuse(&["run", "typo.toml", "--out", "out"], &words);
+    }
+    let head = suite.split("[study.reach]").next().unwrap();
+    folder.write("head.toml", head);
+    folder.refuse(&["run", "head.toml", "--out", "out"], &["missing field `study`"]);
     folder.refuse(
         &["run", "closed-form/reach", "--method", "ik1", "--out", "out"],
         &["closed-form/reach", "--method"],
