@@ -455,6 +455,8 @@ fn suites_of_limbs_leave_rows_and_figures_and_are_kept() {
         let svg = fs::read_to_string(folder.0.join(format!("out/figures/closed_form_{name}.svg"))).unwrap();
         assert!(svg.contains("</svg>") && !svg.contains("NaN"), "{name}");
     }
+    let workspace = fs::read_to_string(folder.path("out/figures/closed_form_workspace.svg")).unwrap();
+    assert!(workspace.contains("7 or 8 solutions") && !workspace.contains("5 or 6 solutions"));
     // Quick rows are made again, in place of the old ones.
     folder.succeed(&run);
     let again = fs::read_to_string(folder.0.join("out/limbs.jsonl")).unwrap();
