@@ -9,7 +9,7 @@ use super::progress::Progress;
 use super::{DEFAULT_FOLDER, EffortArgs, Everything, Failure, RunArgs, draw};
 use crate::error::InputError;
 use crate::instance::Instance;
-use crate::limbs::{Amount, LIMBS_FILE, LimbStore, LimbSuite, is_limb_suite, limbs_terminal};
+use crate::limbs::{Amount, LIMBS_FILE, LimbStore, LimbSuite, Plan, is_limb_suite, limbs_terminal};
 use crate::machine::{is_pinned, machine, revision};
 use crate::records::{Machine, Row};
 use crate::records_io::{ROWS_FILE, RecordError, RowKey, RowStore, write_atomically, write_trace};
@@ -172,6 +172,9 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write) -> Result<(), Failure> {
     }
     write!(out, "{}", summary::terminal_table(&recorder.rows))?;
     write!(out, "{}", limbs_terminal(&limbs.rows))?;
+    for note in plans.iter().flat_map(Plan::notes) {
+        writeln!(out, "note: {note}")?;
+    }
     Ok(tell_kept(recorder.kept + limbs.kept, out)?)
 }
 

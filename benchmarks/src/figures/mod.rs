@@ -232,6 +232,23 @@ struct Traced<'a> {
     trace: Trace,
 }
 
+/// What stands below a figure whose axes are those of [`survivors`].
+const AXES_OF_SURVIVORS: &str = "Linear axes fit the runs that survived. Lines end at the edge of the panel, and leaps over its height are left out.";
+
+/// The runs that axes are fitted to, for one that diverges would make all others one flat line: those that survived, or
+/// all if none did.
+fn survivors<'t, 'a>(traced: &'t [Traced<'a>]) -> Vec<&'t Traced<'a>> {
+    let survived = |one: &&Traced<'_>| {
+        let metrics = one.run.row.metrics.as_ref();
+        metrics.is_some_and(|metrics| metrics.quality.survived)
+    };
+    let survivors: Vec<&Traced<'a>> = traced.iter().filter(survived).collect();
+    if survivors.is_empty() {
+        return traced.iter().collect();
+    }
+    survivors
+}
+
 impl<'a> Studio<'a> {
     /// Runs of a scenario.
     fn runs_of(&self, suite: &str, scenario: &str) -> Vec<Labelled<'a>> {

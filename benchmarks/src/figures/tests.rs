@@ -256,6 +256,36 @@ fn samples_that_are_not_finite_interrupt_a_curve() {
 }
 
 #[test]
+fn a_run_that_diverges_leaves_the_panel_to_the_survivors() {
+    let dir = folder("diverging");
+    write_results(&dir);
+    let draw = |name: &str| {
+        draw_into(&dir);
+        figure(&dir, name)
+    };
+    let rows = read_rows(&dir.join(ROWS_FILE)).unwrap().rows;
+    for (name, suite, column) in [
+        ("fig2_stretch.svg", "coman/stretch", "LKneeSag"),
+        ("fig4_lean.svg", "coman/lean", "LHipSag"),
+    ] {
+        assert!(!draw(name).contains("leaving the panel"), "{name}");
+        let wild = |row: &&Row| row.suite == suite && row.method == "a-later-one";
+        let mut wild = rows.iter().find(wild).unwrap().clone();
+        let path = dir.join(wild.trace.as_ref().unwrap());
+        let mut trace = read_trace(&path).unwrap();
+        let at = trace.columns.iter().position(|c| c == column).unwrap();
+        trace.rows.iter_mut().for_each(|row| row[at] *= 1e4);
+        write_trace(&path, &trace).unwrap();
+        wild.metrics.as_mut().unwrap().quality.survived = false;
+        RowStore::open(&dir).unwrap().push(wild).unwrap();
+        let after = draw(name);
+        assert!(after.contains("leaving the panel: a-later-one (to "), "{name}");
+        assert!(after.contains(AXES_OF_SURVIVORS), "{name}");
+    }
+    std::fs::remove_dir_all(dir).unwrap();
+}
+
+#[test]
 fn a_malformed_trace_is_an_error_that_names_its_place() {
     let dir = single("malformed", &SQUAT, &[&[0.0, 0.0, 0.0, 0.0]]);
     std::fs::write(dir.join("traces/a.csv"), "t,com_error_m\n0,zero\n").unwrap();

@@ -203,11 +203,7 @@ impl Suite {
             return Self::parse(text, &format!("suite {id}"), Path::new("."));
         }
         if !name.ends_with(".toml") {
-            let known = EMBEDDED
-                .iter()
-                .map(|(id, _)| *id)
-                .chain(["or the path of a .toml file"]);
-            return Err(InputError::unknown("command line", "suite", name, known));
+            return Err(unknown(name));
         }
         let text = std::fs::read_to_string(name).map_err(|e| InputError::File {
             file: name.to_owned(),
@@ -252,6 +248,20 @@ impl Suite {
         }
         Ok(suite)
     }
+}
+
+/// A name that is no suite: of a group of suites, or of nothing.
+fn unknown(name: &str) -> InputError {
+    let embedded = EMBEDDED.iter().chain(crate::limbs::EMBEDDED);
+    let ids: Vec<&str> = embedded.map(|(id, _)| *id).collect();
+    let group = format!("{}/", name.trim_end_matches('/'));
+    let of_group: Vec<&str> = ids.iter().copied().filter(|id| id.starts_with(&group)).collect();
+    if of_group.is_empty() {
+        let known = ids.into_iter().chain(["or the path of a .toml file"]);
+        return InputError::unknown("command line", "suite", name, known);
+    }
+    let allowed = format!("the suites of this group: {}", of_group.join(", "));
+    InputError::value("command line", "suite", name, &allowed)
 }
 
 /// Ids become names of files.

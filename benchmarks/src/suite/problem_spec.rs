@@ -148,6 +148,15 @@ impl RobotSpec {
         })
     }
 
+    /// The robot as `--robot` takes it.
+    pub(crate) fn argument(&self) -> &str {
+        match self {
+            Self::Embedded(id) => id,
+            Self::UrdfFile { path, .. } => path,
+            Self::Urdf { name, .. } => name,
+        }
+    }
+
     /// Builds the robot; `place` goes into messages.
     ///
     /// # Errors

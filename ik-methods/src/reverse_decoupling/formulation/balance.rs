@@ -3,7 +3,7 @@
 use super::plan::Target;
 use super::rates::{centre_of_mass_rate, is_regular, joint_rates};
 use super::region::{Halfspace, Reach, Region, Ring};
-use super::whole_body::{Candidate, OUTSIDE_RAD, Step, Work, conclude, root_pose};
+use super::whole_body::{Candidate, Free, OUTSIDE_RAD, Step, Work, conclude, root_pose};
 use ik_core::evaluator::Evaluator;
 use ik_core::formulation::Termination;
 use nalgebra::Vector3;
@@ -47,7 +47,7 @@ impl Step<'_> {
         let (newton, _) = self.next(Way::Along, &work.best, &mut work.region);
         for length in FIRST_LENGTHS {
             let guess = length.map_or(newton, |part| work.region.nearest(&(before + ahead * part)));
-            self.evaluate(guess, centre, work, eval);
+            self.evaluate(guess, centre, Free::Rests, work, eval);
             if length.is_none() || work.trial.merit.is_better_than(&work.best.merit) {
                 std::mem::swap(&mut work.trial, &mut work.best);
             }
@@ -68,10 +68,23 @@ impl Step<'_> {
                 return left.unwrap_or(Termination::Budget);
             }
             if !self.improve(centre, work, eval) {
+                if left.is_some() && self.improves_where_free(centre, work, eval) {
+                    continue;
+                }
                 let missing_m = merit.away.norm();
                 return left.unwrap_or(Termination::OutOfReach { missing_m });
             }
         }
+    }
+
+    /// Stays in place and lets free joints give way.
+    fn improves_where_free(&self, centre: &Vector3<f64>, work: &mut Work, eval: &mut Evaluator) -> bool {
+        self.evaluate(work.best.origin, centre, Free::GivesWay, work, eval);
+        let improves = work.trial.merit.is_better_than(&work.best.merit);
+        if improves {
+            std::mem::swap(&mut work.trial, &mut work.best);
+        }
+        improves
     }
 
     /// Where the root may go next from a candidate, and the centre of mass that is predicted to be left there (m).
@@ -122,7 +135,7 @@ impl Step<'_> {
                 let Some(length) = lengths.next().filter(|_| gains) else {
                     break;
                 };
-                self.evaluate(from + (target - from) * *length, centre, work, eval);
+                self.evaluate(from + (target - from) * *length, centre, Free::Rests, work, eval);
                 if work.trial.merit.is_better_than(&work.best.merit) {
                     std::mem::swap(&mut work.trial, &mut work.best);
                     return true;
@@ -202,9 +215,16 @@ impl Step<'_> {
     }
 
     /// Solves all limbs with the root at `origin`, then the tree for the centre of mass: the trial.
-    fn evaluate(&self, origin: Vector3<f64>, centre: &Vector3<f64>, work: &mut Work, eval: &mut Evaluator) {
+    fn evaluate(
+        &self,
+        origin: Vector3<f64>,
+        centre: &Vector3<f64>,
+        free: Free,
+        work: &mut Work,
+        eval: &mut Evaluator,
+    ) {
         let Work { targets, trial, .. } = work;
-        self.limbs(origin, targets, trial);
+        self.limbs(origin, targets, free, trial);
         if trial.merit.missing_m == 0.0 {
             eval.pass(&trial.q, &mut trial.page);
             trial.merit.away = centre - trial.page.centre_of_mass();

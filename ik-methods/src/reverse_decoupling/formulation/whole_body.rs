@@ -25,6 +25,15 @@ pub(super) struct Candidate {
     pub(super) merit: Merit,
 }
 
+/// What joints do that a singularity leaves free.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Free {
+    /// They rest.
+    Rests,
+    /// They rest, unless another joint of the limb would leave its interval.
+    GivesWay,
+}
+
 /// How good a candidate is.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Merit {
@@ -132,7 +141,7 @@ impl<'a> Step<'a> {
                 Waist::Prescribed(_, place) => place.point(self.x) - self.rotation * place.in_body.coords,
                 Waist::Fixed | Waist::Balanced(..) => Vector3::zeros(),
             };
-            self.limbs(origin, &work.targets, &mut work.best);
+            self.limbs(origin, &work.targets, Free::GivesWay, &mut work.best);
             return conclude(&work.best.merit);
         };
         self.balance(&centre, work, eval)
@@ -171,7 +180,13 @@ impl<'a> Step<'a> {
     }
 
     /// Solves all limbs with the root at `origin`.
-    pub(super) fn limbs(&self, origin: Vector3<f64>, targets: &[Isometry3<f64>], out: &mut Candidate) {
+    pub(super) fn limbs(
+        &self,
+        origin: Vector3<f64>,
+        targets: &[Isometry3<f64>],
+        free: Free,
+        out: &mut Candidate,
+    ) {
         out.origin = origin;
         out.merit = Merit::default();
         out.q.copy_from_slice(self.step.q_prev);
@@ -192,12 +207,12 @@ impl<'a> Step<'a> {
         }
         let root = Isometry3::from_parts(Translation3::from(origin), self.rotation);
         for (plan, target) in self.plan.limbs.iter().zip(targets) {
-            self.limb(plan, &root.inv_mul(target), out);
+            self.limb(plan, &root.inv_mul(target), free, out);
         }
     }
 
     /// Solves one limb for the pose of its last body in the root.
-    fn limb(&self, plan: &LimbPlan, pose: &Isometry3<f64>, out: &mut Candidate) {
+    fn limb(&self, plan: &LimbPlan, pose: &Isometry3<f64>, free: Free, out: &mut Candidate) {
         let root = self.robot.root();
         let joints = plan.coordinates.len();
         let mut before = [0.0; MOST_JOINTS];
@@ -207,22 +222,8 @@ impl<'a> Step<'a> {
         let before = &before[..joints];
         let mut nearest = Nearest::default();
         let solved = self.solutions(plan, pose, before, before, &mut nearest);
-        // A joint that a singularity leaves free rests; where that puts another one outside, it gives way by as much.
-        let Nearest {
-            motion,
-            outside: (excess, _),
-            ..
-        } = nearest;
-        if solved.is_ok() && excess > OUTSIDE_RAD {
-            for free in (0..joints).filter(|&k| motion[k] == 0.0) {
-                for sign in [1.0, -1.0] {
-                    let mut moved = [0.0; MOST_JOINTS];
-                    moved[..joints].copy_from_slice(before);
-                    moved[free] += sign * excess;
-                    // It is within reach as before.
-                    let _ = self.solutions(plan, pose, before, &moved[..joints], &mut nearest);
-                }
-            }
+        if solved.is_ok() && nearest.outside.0 > OUTSIDE_RAD && matches!(free, Free::GivesWay) {
+            self.give_way(plan, pose, before, &mut nearest);
         }
         match solved {
             Ok(_) => {
@@ -237,6 +238,27 @@ impl<'a> Step<'a> {
                 out.merit.missing_m = out.merit.missing_m.max(missing(&unsolved));
             }
             Err(unsolved) => out.merit.left_m = out.merit.left_m.max(missing(&unsolved)),
+        }
+    }
+
+    /// Solutions in which one joint that a singularity leaves free has moved by as much as another one is outside. Any joint that
+    /// rests may be such a one.
+    fn give_way(&self, plan: &LimbPlan, pose: &Isometry3<f64>, before: &[f64], nearest: &mut Nearest) {
+        let Nearest {
+            motion,
+            outside: (excess, _),
+            ..
+        } = *nearest;
+        for free in (0..before.len()).filter(|&k| motion[k] == 0.0) {
+            for sign in [1.0, -1.0] {
+                let mut moved = [0.0; MOST_JOINTS];
+                moved[..before.len()].copy_from_slice(before);
+                moved[free] += sign * excess;
+                let held = &moved[..before.len()];
+                if self.solutions(plan, pose, before, held, nearest).is_err() {
+                    return;
+                }
+            }
         }
     }
 
