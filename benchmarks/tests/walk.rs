@@ -22,9 +22,12 @@ struct Walked {
 
 impl Walked {
     fn new(suite: &str, scenario: &str, id: &str) -> Self {
-        let suite = Suite::load(suite).unwrap();
+        Self::of(&Suite::load(suite).unwrap(), scenario, id)
+    }
+
+    fn of(suite: &Suite, scenario: &str, id: &str) -> Self {
         let index = suite.scenarios.iter().position(|s| s.id == scenario).unwrap();
-        let case = Case::new(&suite, index, &Variation::default()).unwrap();
+        let case = Case::new(suite, index, &Variation::default()).unwrap();
         let contestant = method(id).unwrap().build(&toml::Table::new()).unwrap();
         let (_, played) = play(&case, &contestant).unwrap();
         let steps = u32::try_from(case.samples.steps()).unwrap();
@@ -213,4 +216,33 @@ fn all_methods_walk_hubo_the_same_way() {
         let worst = apart.fold(0.0, f64::max);
         assert!(worst < 1e-3, "{id}: {worst}");
     }
+}
+
+/// Two objectives of one kind, with different weights, are two values; not the mean of both under one name.
+#[test]
+fn objectives_of_one_kind_are_told_apart() {
+    let walk = benchmarks::suite::EMBEDDED
+        .iter()
+        .find(|(id, _)| *id == "melson/walk")
+        .unwrap()
+        .1;
+    let weights = format!("weights = [{}]", ["4.0"; 19].join(", "));
+    let second =
+        format!("kind = \"gravity-torque\"\n\n[[problem.objectives]]\nkind = \"gravity-torque\"\n{weights}");
+    let text = walk
+        .replace("id = \"melson/walk\"", "id = \"mine\"")
+        .replace("kind = \"gravity-torque\"", &second)
+        .replace(
+            "single_support_ramp_s = 0.3 }]",
+            "single_support_ramp_s = 0.3 }, { value = 0.0 }]",
+        )
+        .replace("duration_s = 12.0", "duration_s = 3.0");
+    let suite = Suite::parse(&text, "mine.toml", std::path::Path::new(".")).unwrap();
+    let walked = Walked::of(&suite, "S1", "clik");
+    let (quality, trace) = (walked.quality(), walked.trace());
+    let [once, fourfold] = ["gravity-torque", "gravity-torque-2"].map(|name| {
+        let column = trace.column(&format!("objective_{name}")).unwrap();
+        (quality.objective_mean[name], column[250])
+    });
+    assert!((fourfold.0 / once.0 - 4.0).abs() < 1e-12 && (fourfold.1 / once.1 - 4.0).abs() < 1e-12);
 }

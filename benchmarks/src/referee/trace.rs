@@ -4,7 +4,7 @@ use super::balance::{Balance, balance};
 use super::judge::com_rate_error;
 use super::tasks::{target_of, task_error, tracked_frames, tracked_point};
 use super::torque::static_torques;
-use super::walk::{support_torques, value, word};
+use super::walk::{names, support_torques, value};
 use super::{Readable, Referee, Run};
 use crate::records::Trace;
 use crate::trajectory::Support;
@@ -97,8 +97,8 @@ fn columns(referee: &Referee) -> Vec<String> {
     if !referee.spec.torque_supports.is_empty() || hangs(referee) {
         columns.extend(joints().map(|joint| format!("torque_{joint}")));
     }
-    let objectives = problem.objectives().iter();
-    columns.extend(objectives.map(|objective| format!("objective_{}", word(objective))));
+    let objectives = names(problem.objectives());
+    columns.extend(objectives.iter().map(|name| format!("objective_{name}")));
     if hangs(referee) {
         columns.push("standing_foot".to_owned());
     }

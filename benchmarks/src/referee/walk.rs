@@ -41,11 +41,24 @@ pub(super) fn judge_walk(referee: &Referee, readable: &Readable<'_>, run: &Run<'
 }
 
 /// The word for an objective, as in suites.
-pub(super) fn word(objective: &Objective) -> &'static str {
+fn word(objective: &Objective) -> &'static str {
     match objective {
         Objective::JointCentring => "joint-centring",
         Objective::GravityTorque { .. } => "gravity-torque",
     }
+}
+
+/// What the objectives of a problem are called: their words, from the second of a kind on with its number.
+pub(super) fn names(objectives: &[Objective]) -> Vec<String> {
+    let of_its_kind = |i: usize| {
+        let before = objectives[..i].iter();
+        1 + before.filter(|o| word(o) == word(&objectives[i])).count()
+    };
+    let name = |(i, objective): (usize, &Objective)| match of_its_kind(i) {
+        1 => word(objective).to_owned(),
+        number => format!("{}-{number}", word(objective)),
+    };
+    objectives.iter().enumerate().map(name).collect()
 }
 
 /// Static torques on the support of the phase (Nm); none if it has none to hold the robot.
@@ -91,13 +104,14 @@ fn judge_objectives(problem: &Problem, readable: &Readable<'_>, quality: &mut Qu
     }
     let mut squares = Spread::default();
     let mut joints = vec![Spread::default(); problem.robot().coordinates().len()];
+    let names = names(problem.objectives());
     let mut values: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for (sample, posture) in readable.iter() {
         let carried = single(sample) || !walks;
         let torques = support_torques(problem, sample, posture).filter(|_| carried);
-        for objective in problem.objectives() {
+        for (objective, name) in problem.objectives().iter().zip(&names) {
             if let Some(value) = value(problem, objective, sample, torques.as_deref()) {
-                values.entry(word(objective)).or_default().push(value);
+                values.entry(name).or_default().push(value);
             }
         }
         if let Some(torques) = torques.filter(|_| walks && supported) {

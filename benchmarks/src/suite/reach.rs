@@ -1,8 +1,9 @@
 //! Footsteps within reach: whether the robot can stand where a walk puts its feet.
 //!
-//! Legs are longest at lift-off and at touchdown. At both ends of every swing the loops are closed from the configuration at the
-//! end before, so the check asks for all tasks at once and knows what the hips can give. Joint limits are not asked for: who
-//! keeps them, and what it costs, is what the runs show.
+//! Legs are longest about lift-off and touchdown, not exactly there: a foot of minimum jerk has nearly arrived while the centre of
+//! mass still waits for it. So the loops are closed at several instants of every swing, each from the configuration at the instant
+//! before; that asks for all tasks at once and knows what the hips can give. Joint limits are not asked for: who keeps them, and
+//! what it costs, is what the runs show.
 
 use super::closure::{Closer, Miss};
 use super::problem_spec::ProblemSpec;
@@ -12,10 +13,13 @@ use crate::trajectory::{Trajectory, WalkSpec};
 /// Halvings of the interval between a length that is within reach and one that is not: to a millionth of it.
 const HALVINGS: u32 = 20;
 
+/// Parts of a swing between the instants that are checked: the least reach over a swing is flat compared with one of them.
+const PARTS: u32 = 20;
+
 /// A walk with other numbers, from its specification.
 type Rebuilt<'a> = dyn Fn(&WalkSpec) -> Result<Trajectory, InputError> + 'a;
 
-/// The end of a swing at which a task cannot be met.
+/// The instant of a swing at which a task cannot be met.
 struct OutOfReach {
     step: usize,
     t: f64,
@@ -48,7 +52,7 @@ pub(super) fn check_footsteps(
     };
     let (mut reached, mut missed) = (0.0, walk.step_m);
     let allowed = if out_of_reach(reached)?.is_some() {
-        "within reach; without any step it is not: change foot_spacing_m, com_height_m or the start"
+        "within reach; without any step it is not: change foot_spacing_m, lift_m, com_height_m or the start"
             .to_owned()
     } else {
         for _ in 0..HALVINGS {
@@ -80,8 +84,9 @@ fn first_out_of_reach(
     let mut q = q_start.to_vec();
     for (i, step) in walk.plan.steps.iter().enumerate() {
         // A motion that ends before the walk does asks for no more.
-        let ends = [step.lift_off_s, step.touch_down_s].into_iter();
-        for t in ends.filter(|t| *t <= walk.until_s) {
+        let swing_s = step.touch_down_s - step.lift_off_s;
+        let instants = (0..=PARTS).map(|i| step.lift_off_s + swing_s * f64::from(i) / f64::from(PARTS));
+        for t in instants.filter(|t| *t <= walk.until_s) {
             let closed = closer.close(trajectory, t, &q, place)?;
             if let Some(miss) = closed.miss {
                 let step = i + 1;

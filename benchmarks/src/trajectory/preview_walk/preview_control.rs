@@ -47,14 +47,24 @@ pub struct CartTable {
     pub jerk_weight: f64,
 }
 
-/// The Riccati recursion did not settle.
+/// The Riccati recursion gave no gains.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error(
-    "no gains: the Riccati recursion did not settle in {MOST_RECURSIONS} steps, its last change was {change:e}"
-)]
-pub struct NoGains {
-    /// Relative change in the last recursion.
-    pub change: f64,
+pub enum NoGains {
+    /// It did not settle.
+    #[error(
+        "no gains: the Riccati recursion did not settle in {MOST_RECURSIONS} steps, its last change was {change:e}"
+    )]
+    Unsettled {
+        /// Relative change in the last recursion.
+        change: f64,
+    },
+    /// It settled where the cart runs away. Without a weight on the jerk `P = Q̃` is a solution, which zeroes the next error
+    /// whatever becomes of the cart; a weight too small to be seen beside `B̃ᵀPB̃` does not lead away from it.
+    #[error("no gains: with them the cart runs away, its largest eigenvalue being {eigenvalue}")]
+    Unstable {
+        /// Largest magnitude of an eigenvalue of the closed loop.
+        eigenvalue: f64,
+    },
 }
 
 /// Gains, made once per walk.
@@ -128,14 +138,14 @@ fn riccati(a: &Matrix4<f64>, b: &Vector4<f64>, q: &Vector4<f64>, r: f64) -> Resu
             return Ok(p);
         }
     }
-    Err(NoGains { change })
+    Err(NoGains::Unsettled { change })
 }
 
 impl PreviewControl {
     /// The gains for a preview of `samples` periods.
     ///
     /// # Errors
-    /// Weights so far apart that the Riccati recursion does not settle.
+    /// Weights so far apart that the Riccati recursion does not settle, or not on gains that hold the cart.
     pub fn new(cart: CartTable, samples: usize) -> Result<Self, NoGains> {
         let (a, b, q) = cart.with_error();
         let r = cart.jerk_weight;
@@ -143,6 +153,10 @@ impl PreviewControl {
         let k = gain(&p, &a, &b, r);
         let scale = 1.0 / (r + (b.transpose() * p * b).x);
         let closed = (a - b * k).transpose();
+        let eigenvalue = closed.complex_eigenvalues().map(|z| z.norm()).amax();
+        if eigenvalue.is_nan() || eigenvalue >= 1.0 {
+            return Err(NoGains::Unstable { eigenvalue });
+        }
         let mut preview_gains = Vec::with_capacity(samples);
         // An increment of the reference i periods ahead is one of the error with the opposite sign: it acts through
         // P (−1, 0, 0, 0) now, and through (Ã − B̃K)ᵀ once per period in between.
@@ -221,6 +235,22 @@ mod tests {
             }
             // Doubling starts from B̃B̃ᵀ/R, 1e6 times larger than what is left of it: so many digits go.
             assert!((h - p).amax() < 1e-6 * p.amax(), "{}", (h - p).amax() / p.amax());
+        }
+    }
+
+    #[test]
+    fn gains_that_let_the_cart_run_away_are_refused() {
+        for jerk_weight in [1e4, 1e-2, 1e-10, 1e-16] {
+            assert!(PreviewControl::new(CartTable { jerk_weight, ..CART }, 10).is_ok());
+        }
+        for jerk_weight in [1e-18, 1e-24, 1e-300] {
+            let Err(NoGains::Unstable { eigenvalue }) =
+                PreviewControl::new(CartTable { jerk_weight, ..CART }, 10)
+            else {
+                panic!("{jerk_weight:e} is accepted");
+            };
+            // The zero of the cart outside the unit circle, exp(T √(g / z_c)) but for the sampling.
+            assert!((eigenvalue - 1.062).abs() < 1e-3, "{eigenvalue}");
         }
     }
 }

@@ -279,7 +279,7 @@ fn refusal(from: &str, to: &str) -> String {
 
 #[test]
 fn numbers_that_cannot_be_are_refused_with_value_and_bound() {
-    let expectations: [(&str, &str, &[&str]); 19] = [
+    let expectations: [(&str, &str, &[&str]); 21] = [
         (
             "single_support_s = 3.0",
             "single_support_s = 0.005",
@@ -326,6 +326,17 @@ fn numbers_that_cannot_be_are_refused_with_value_and_bound() {
             "step_m = 0.05",
             "step_m = 0.5",
             &["walk.step_m = 0.5", "is missed by", "in step 1", "at most 0.1"],
+        ),
+        // Out of reach in the swing only: both ends of it can be met.
+        (
+            "step_m = 0.05",
+            "step_m = 0.118",
+            &["walk.step_m = 0.118", "is missed by", "in step 1", "at most 0.1"],
+        ),
+        (
+            "jerk_weight = 1e-6",
+            "jerk_weight = 1e-20",
+            &["walk.preview = no gains", "runs away", "weights nearer"],
         ),
         ("lift_m = 0.02", "lift_m = 0.0", &["walk.lift_m = 0", "above 0"]),
         (
