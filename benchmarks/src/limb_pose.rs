@@ -3,12 +3,13 @@
 use crate::error::{InputError, finite};
 use crate::suite::RobotSpec;
 use ik_core::kinematics::{Page, forward};
-use ik_core::robot::{FrameId, Robot};
+use ik_core::robot::{FrameId, Limits, Robot};
 use ik_methods::reverse_decoupling::analyser::{Family, LimbReport, Side, limbs};
 use ik_methods::reverse_decoupling::{ArmBranch, LegBranch, Limb, Unsolved};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 /// Version of the layout.
 pub const SCHEMA: &str = "ik-bench/limb-pose/1";
@@ -49,16 +50,26 @@ pub struct LimbAnswer {
     pub solutions: Vec<LimbSolution>,
 }
 
+impl LimbAnswer {
+    /// The nearest solution alone: of those within the limits if there is one, else of all.
+    pub fn nearest(mut self) -> Self {
+        let within = self.solutions.iter().position(|s| s.within_limits);
+        self.solutions.drain(..within.unwrap_or(0));
+        self.solutions.truncate(1);
+        self
+    }
+}
+
 /// One posture of the limb.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LimbSolution {
-    /// Joint values by name (rad), in (−π, π].
+    /// Joint values by name (rad), each in the turn that is within its limits and nearest to `previous`.
     pub joints: BTreeMap<String, f64>,
     /// Number of the branch.
     pub branch: u8,
     /// Decision indicators by name, +1 or −1; none in the general family.
     pub indicators: BTreeMap<&'static str, i8>,
-    /// Largest difference of a joint from `previous` (rad).
+    /// Largest difference of a joint from `previous` (rad), modulo full turns.
     pub away_rad: f64,
     /// Whether all joints are within the robot's limits.
     pub within_limits: bool,
@@ -149,12 +160,8 @@ impl LimbPoseFile {
         let quaternion = Quaternion::new(w, x, y, z);
         if (quaternion.norm() - 1.0).abs() > UNIT_TOLERANCE {
             let found = format!("of length {}", quaternion.norm());
-            return Err(InputError::value(
-                source,
-                "rotation_xyzw",
-                found,
-                "a unit quaternion",
-            ));
+            let allowed = format!("a unit quaternion, its length within {UNIT_TOLERANCE:e} of 1");
+            return Err(InputError::value(source, "rotation_xyzw", found, &allowed));
         }
         let turn = UnitQuaternion::from_quaternion(quaternion);
         Ok(Isometry3::from_parts(Translation3::from(self.position_m), turn))
@@ -193,15 +200,15 @@ fn solution(
     branch: u8,
     previous: &[f64],
 ) -> LimbSolution {
-    let wrapped = |d: f64| d - std::f64::consts::TAU * (d / std::f64::consts::TAU).round();
+    let wrapped = |d: f64| d - TAU * (d / TAU).round();
     let away = q.iter().zip(previous).map(|(a, b)| wrapped(a - b).abs());
-    let coordinate = |joint: &usize| robot.joints()[*joint].coordinate;
-    let limits = report
-        .joints
-        .iter()
-        .map(|j| robot.coordinates()[coordinate(j)].limits);
-    let inside = |(q, l): (&f64, ik_core::robot::Limits)| (l.lower..=l.upper).contains(q);
-    let off = wanted.inverse() * reached(robot, report, frame, q);
+    let limits = |joint: &usize| robot.coordinates()[robot.joints()[*joint].coordinate].limits;
+    let limits: Vec<Limits> = report.joints.iter().map(limits).collect();
+    let turned = q.iter().zip(&limits).zip(previous);
+    let q: Vec<f64> = turned
+        .map(|((q, limits), previous)| in_turn(*q, limits, *previous))
+        .collect();
+    let off = wanted.inverse() * reached(robot, report, frame, &q);
     LimbSolution {
         joints: report
             .joint_names
@@ -212,10 +219,28 @@ fn solution(
         branch,
         indicators: indicators(report, branch),
         away_rad: away.fold(0.0, f64::max),
-        within_limits: q.iter().zip(limits).all(inside),
+        within_limits: q.iter().zip(&limits).all(|(q, limits)| is_within(limits, *q)),
         error_m: off.translation.vector.norm(),
         error_rad: off.rotation.angle(),
     }
+}
+
+/// The angle full turns away from `q` that is nearest to `previous`, among those within the limits if there are any.
+fn in_turn(q: f64, limits: &Limits, previous: f64) -> f64 {
+    let nearest = |to: f64| q + TAU * ((to - q) / TAU).round();
+    // The nearest one inside is next to that part of the limits which is nearest.
+    let around = nearest(previous.clamp(limits.lower, limits.upper));
+    let inside = [around, around - TAU, around + TAU]
+        .into_iter()
+        .filter(|angle| is_within(limits, *angle));
+    let away = |angle: &f64| (angle - previous).abs();
+    inside
+        .min_by(|a, b| away(a).total_cmp(&away(b)))
+        .unwrap_or_else(|| nearest(previous))
+}
+
+fn is_within(limits: &Limits, q: f64) -> bool {
+    (limits.lower..=limits.upper).contains(&q)
 }
 
 /// Pose of the frame in the body that carries the limb, by the robot's kinematics.
@@ -264,3 +289,6 @@ pub(crate) fn indicators(report: &LimbReport, branch: u8) -> BTreeMap<&'static s
         Family::General { .. } => BTreeMap::new(),
     }
 }
+
+#[cfg(test)]
+mod tests;

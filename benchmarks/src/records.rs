@@ -141,6 +141,42 @@ pub struct Quality {
     /// (m). None also as before.
     #[serde(default)]
     pub zmp_gcom_distance_rms_m: Option<f64>,
+    /// Per secondary objective of the problem, by its kind: mean of its value, of joint centring over k ≥ 0, of the gravity torque
+    /// over the samples in which one foot carries (k ≥ 0 in runs without such samples).
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub objective_mean: BTreeMap<String, f64>,
+    /// Mean of the sum of squared static joint torques over the samples in which one foot carries (N²m²), the robot hanging
+    /// from the support of the phase. None, and the next two empty, where the problem names no supports or both feet always
+    /// carry.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub single_support_torque_squared_mean_n2m2: Option<f64>,
+    /// RMS of each joint's torque over the same samples (Nm), by joint.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub single_support_torque_rms_nm: BTreeMap<String, f64>,
+    /// Largest size of each joint's torque over them (Nm), by joint.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub single_support_torque_peak_nm: BTreeMap<String, f64>,
+    /// Mean over the cycles of two steps of the largest change of a joint from one cycle to the next (rad), the first and the
+    /// closing step left out. None, as the next, where a walk has fewer than two such cycles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_drift_mean_rad_per_cycle: Option<f64>,
+    /// The same over the last cycle alone (rad).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint_drift_last_rad_per_cycle: Option<f64>,
+    /// RMS of the distance between the zero-moment point of the cart and its reference, later than 0.2 s and without the first
+    /// and the last two samples (m). None, as the next three, where nothing walks by preview control or the suite names no
+    /// soles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zmp_reference_error_rms_m: Option<f64>,
+    /// Its largest value (m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zmp_reference_error_max_m: Option<f64>,
+    /// `zmp_margin_min_m` over the same samples (m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub settled_zmp_margin_min_m: Option<f64>,
+    /// `cart_zmp_margin_min_m` over the same samples (m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub settled_cart_zmp_margin_min_m: Option<f64>,
     /// All finite, limit violation ≤ 1e-6 rad, boundary value ≤ 1e-4 (a polygon: excess ≤ 1e-6 rad
     /// instead, a box: no speed limit passed), hard errors
     /// < 1e-3, `soft_error_max_m` below the tolerance of the suite. Balance does not count.
@@ -203,13 +239,15 @@ pub struct Effort {
 /// Columns: `t`; `base_x base_y base_z base_qx base_qy base_qz base_qw` if the root floats; one per joint by its name; then
 /// per task `<task>_target_<component>` (x y z, roll pitch yaw, or qx qy qz qw), the actual point `<task>_x _y _z` (m) of
 /// tasks that track one, `<task>_error_m` and/or `<task>_error_rad` (norm, angle), `<task>_rate_error_m_s` for the centre of mass; `step_us`, `majors`, `minors` (0 at
-/// k = 0); where the suite asks for torques `torque_<joint>` (Nm).
+/// k = 0); where the suite asks for torques or the problem names supports `torque_<joint>` (Nm), on the support of the phase in
+/// the latter case; `objective_<kind>` per secondary objective; where the problem names supports `standing_foot` (−1 where the right
+/// foot stands alone, 1 the left, 0 both).
 ///
 /// Where it names soles, all on the ground, in m and in the world: `gcom_x gcom_y` (projected centre of mass), `zmp_x zmp_y`
 /// (zero-moment point of point masses), `cart_zmp_x cart_zmp_y` (that of the cart), `support_x_min support_x_max
 /// support_y_min support_y_max` (extent of the support polygon), `gcom_margin zmp_margin` (signed distances to its border,
 /// positive inside). Accelerations at k = 0 and N are those at k = 1 and N − 1. Where the ground would have to pull there is
-/// no zero-moment point: `zmp_x zmp_y zmp_margin` are NaN.
+/// no zero-moment point: `zmp_x zmp_y zmp_margin` are NaN. Where it walks by preview control, `zmp_reference_x zmp_reference_y` last.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
     /// Column names.

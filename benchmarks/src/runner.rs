@@ -15,7 +15,6 @@ use crate::referee::{Run, StepEfforts};
 use crate::suite::Case;
 use ik_core::driver::Driver;
 use ik_core::formulation::Termination;
-use ik_core::problem::PhaseId;
 use ik_methods::registry::{Contestant, method};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -25,8 +24,6 @@ use walk::{Timed, time, walk};
 
 /// The method that step times are compared with.
 pub const REFERENCE: &str = "ik1";
-/// The only phase of a suite's problem.
-const WHOLE: PhaseId = PhaseId(0);
 
 /// How often a motion is replayed for its step times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,7 +89,7 @@ pub struct Finished {
 }
 
 impl Finished {
-    /// The run over time; none if the method declined.
+    /// The run over time, at the samples that the suite keeps; none if the method declined.
     pub fn trace(&self, case: &Case) -> Option<Trace> {
         let efforts = StepEfforts {
             step_us: &self.step_us,
@@ -100,7 +97,16 @@ impl Finished {
             minors: &self.played.minors,
         };
         let run = judged_run(case, &self.played);
-        (!self.played.q.is_empty()).then(|| case.referee.trace(&run, &efforts))
+        if self.played.q.is_empty() {
+            return None;
+        }
+        let mut trace = case.referee.trace(&run, &efforts);
+        let (mut k, last) = (0, trace.rows.len().saturating_sub(1));
+        trace.rows.retain(|_| {
+            k += 1;
+            (k - 1) % case.trace_every == 0 || k - 1 == last
+        });
+        Some(trace)
     }
 }
 
@@ -233,8 +239,9 @@ fn judged_run<'a>(case: &'a Case, played: &'a Played) -> Run<'a> {
         dt_s: case.dt_s,
         q: &played.q,
         targets: case.samples.judged(),
-        phases: &[WHOLE],
+        phases: &case.phases,
         support: &case.support,
+        walk: case.walk.as_ref(),
     }
 }
 

@@ -4,6 +4,7 @@
 
 mod readme;
 mod terminal;
+mod walk;
 
 use crate::figures::labels::{Labelled, labelled};
 use crate::limbs::{LimbRow, limbs_markdown};
@@ -14,6 +15,7 @@ use std::collections::BTreeMap;
 
 use std::path::{Path, PathBuf};
 pub use terminal::{TERMINAL_WIDTH, terminal_table};
+use walk::walk_table;
 
 /// Shown where there is no number.
 pub(crate) const NONE: &str = "–";
@@ -35,10 +37,11 @@ pub fn write_summary(
     Ok(path)
 }
 
-/// The whole summary in Markdown: one table per suite with its analysis.
+/// The whole summary in Markdown: one table per suite with its analysis, and a second one for suites that walk.
 pub fn summary_markdown(rows: &[Row], analysis: &BTreeMap<String, String>) -> String {
     let runs = labelled(rows);
     let mut text = String::from("# Summary\n\n");
+    let mut walks = false;
     text.push_str(&origin(rows));
     for suite in suites(&runs) {
         text.push_str(&format!("\n## {suite}\n\n"));
@@ -50,6 +53,10 @@ pub fn summary_markdown(rows: &[Row], analysis: &BTreeMap<String, String>) -> St
             &HEADER,
             &of_suite.iter().map(|r| cells(r)).collect::<Vec<_>>(),
         ));
+        if let Some(table) = walk_table(&of_suite) {
+            text.push_str(&format!("\n{table}"));
+            walks = true;
+        }
     }
     text.push_str(
         "\nsoft: distance of the compromised task (a frame or the centre of mass) that misses its point most. hard max: the \
@@ -57,6 +64,9 @@ pub fn summary_markdown(rows: &[Row], analysis: &BTreeMap<String, String>) -> St
          singularity for good. g max: largest boundary value, at most 0 inside the ellipse. ×ik1: median step time \
          relative to ik1 on the same scenario.\n",
     );
+    if walks {
+        text.push_str(&format!("\n{}", walk::LEGEND));
+    }
     text
 }
 

@@ -60,6 +60,7 @@ fn judged(case: &Case, q: &[Vec<f64>]) -> Quality {
         targets: case.samples.judged(),
         phases: &[PhaseId(0)],
         support: &case.support,
+        walk: None,
     })
 }
 

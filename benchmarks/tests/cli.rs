@@ -94,6 +94,21 @@ fn unknown_names_are_refused() {
         &["run", "coman/squad"],
         &["suite `coman/squad`", "did you mean `coman/squat`?", "coman/lean"],
     );
+    refuse(
+        &["run", "closed-form/gird"],
+        &["did you mean `closed-form/grid`?", "coman/lean"],
+    );
+    refuse(
+        &["run", "closed-form"],
+        &[
+            "suite = closed-form",
+            "this group: closed-form/grid, closed-form/continuity",
+        ],
+    );
+    refuse(
+        &["run", "coman/"],
+        &["suite = coman/", "this group: coman/squat, coman/stretch"],
+    );
     refuse(&["run", "nowhere.toml"], &["nowhere.toml", "cannot be read"]);
     refuse(
         &["run", "coman/squat", "--method", "ik44"],
@@ -230,7 +245,10 @@ fn bad_instances_and_folders_are_refused() {
     let broken = folder.write("broken.json", "{\"schema\": \"ik-bench/instance/1\", ");
     folder.refuse(&["solve", &broken], &["broken.json", "line 1 column"]);
     let nan = folder.write("nan.json", "{\"schema\": NaN}");
-    folder.refuse(&["solve", &nan], &["nan.json", "line 1 column"]);
+    folder.refuse(
+        &["solve", &nan],
+        &["nan.json", "not a number at line 1 column 12"],
+    );
     folder.refuse(&["figures", "nowhere"], &["nowhere"]);
     folder.refuse(&["readme", "nowhere", "README.md"], &["nowhere"]);
     folder.refuse(&["list", "animals"], &["animals", "methods"]);
@@ -281,6 +299,27 @@ fn methods_are_explained() {
         "{limbs}"
     );
     assert_eq!(limbs.matches("theta = q +90.000 deg").count(), 2, "{limbs}");
+    assert_eq!(
+        folder.succeed(&["explain", "closed-form", "--robot", "hrp2"]),
+        limbs
+    );
+    let urdf = "<robot name='post'><link name='a'/><link name='b'/><joint name='turn' type='continuous'>\
+                <parent link='a'/><child link='b'/><axis xyz='0 0 1'/></joint></robot>";
+    folder.write("post.urdf", urdf);
+    let post = folder.succeed(&["explain", "closed-form", "--robot", "post.urdf"]);
+    assert!(
+        post.contains("limbs of post") && post.contains("fewer than six joints"),
+        "{post}"
+    );
+    folder.refuse(&["explain", "closed-form", "--robot", "no.urdf"], &["no.urdf"]);
+    folder.refuse(
+        &["explain", "closed-form", "--robot", "hubo", "--svg", "out.svg"],
+        &["--svg = out.svg", "davies"],
+    );
+    folder.refuse(
+        &["explain", "closed-form", "--suite", "closed-form/grid"],
+        &["--suite = closed-form/grid", "--robot"],
+    );
     folder.refuse(&["explain", "ik4", "--robot", "bioloid"], &["ik4", "davies"]);
     folder.refuse(&["explain", "davies", "--robot", "arm7"], &["arm7", "bioloid"]);
     folder.refuse(
@@ -330,7 +369,41 @@ fn a_limb_takes_a_pose_in_all_its_postures() {
     folder.refuse(&["solve", &path], &["previous", "l_leg_4", "r_leg_4"]);
     let skewed = file("r_sole", -0.7, "").replace("[0.0, 0.0, 0.0, 1.0]", "[0.0, 0.3, 0.0, 1.0]");
     let path = folder.write("bad.json", &skewed);
-    folder.refuse(&["solve", &path], &["rotation_xyzw", "unit quaternion"]);
+    folder.refuse(&["solve", &path], &["rotation_xyzw", "unit quaternion", "1e-6"]);
+}
+
+#[test]
+fn a_file_to_solve_is_judged_by_the_schema_it_names() {
+    let folder = Folder::new("schema");
+    let good = "{\"schema\": \"ik-bench/limb-pose/1\",\n \"robot\": {\"embedded\": \"hubo\"}, \"frame\": \"r_sole\",\n \
+                \"position_m\": [0.05, -0.1, -0.7],\n \"rotation_xyzw\": [0.0, 0.0, 0.0, 1.0],\n \
+                \"previous\": {\"r_leg_4\": 1.0}}";
+    folder.succeed(&["solve", &folder.write("good.json", good)]);
+    let refuse = |from: &str, to: &str, words: &[&str]| {
+        assert!(good.contains(from), "{from}");
+        let path = folder.write("bad.json", &good.replacen(from, to, 1));
+        folder.refuse(&["solve", &path], &[&["bad.json"], words].concat());
+    };
+    refuse("-0.1", "NaN", &["not a number at line 3 column"]);
+    refuse("-0.1", "-Infinity", &["line 3 column"]);
+    refuse("-0.1", "1e999", &["number out of range at line 3 column"]);
+    refuse(
+        "\"r_leg_4\": 1.0",
+        "\"r_leg_4\": NaN",
+        &["not a number at line 5"],
+    );
+    let both = "allowed: ik-bench/instance/1, ik-bench/limb-pose/1";
+    refuse(
+        "limb-pose/1",
+        "limb-pose/2",
+        &["schema = \"ik-bench/limb-pose/2\"", both],
+    );
+    refuse(
+        "\"schema\": \"ik-bench/limb-pose/1\",",
+        "",
+        &["schema = missing", both],
+    );
+    refuse("\"frame\"", "\"fram\"", &["unknown field `fram`", "`frame`"]);
 }
 
 #[test]
@@ -342,6 +415,17 @@ fn suites_of_limbs_leave_rows_and_figures_and_are_kept() {
         &["run", "mine.toml", "--out", "out"],
         &["mine.toml: study.reach.slices[0]", "nao/r_sole", "hubo/r_sole"],
     );
+    for (from, to, words) in [
+        ("study.reach", "stduy.reach", ["unknown field `stduy`", "`study`"]),
+        ("robots = [", "robot = [", ["unknown field `robot`", "`robots`"]),
+        ("robots = [", "limbs = [", ["unknown field `limbs`", "`robots`"]),
+    ] {
+        folder.write("typo.toml", &suite.replace(from, to));
+        folder.refuse(&["run", "typo.toml", "--out", "out"], &words);
+    }
+    let head = suite.split("[study.reach]").next().unwrap();
+    folder.write("head.toml", head);
+    folder.refuse(&["run", "head.toml", "--out", "out"], &["missing field `study`"]);
     folder.refuse(
         &["run", "closed-form/reach", "--method", "ik1", "--out", "out"],
         &["closed-form/reach", "--method"],
@@ -371,6 +455,8 @@ fn suites_of_limbs_leave_rows_and_figures_and_are_kept() {
         let svg = fs::read_to_string(folder.0.join(format!("out/figures/closed_form_{name}.svg"))).unwrap();
         assert!(svg.contains("</svg>") && !svg.contains("NaN"), "{name}");
     }
+    let workspace = fs::read_to_string(folder.path("out/figures/closed_form_workspace.svg")).unwrap();
+    assert!(workspace.contains("7 or 8 solutions") && !workspace.contains("5 or 6 solutions"));
     // Quick rows are made again, in place of the old ones.
     folder.succeed(&run);
     let again = fs::read_to_string(folder.0.join("out/limbs.jsonl")).unwrap();

@@ -496,6 +496,43 @@ fn a_hip_beside_the_ankle_axis_stays_singular_in_rounded_poses() {
 }
 
 /// Equal links folded up, the shoulder at S2 = 0: θ1, θ3, θ5 and θ6 are free together.
+/// An offset that is rounding of a model: on the ankle's axis its products vanish.
+#[test]
+fn a_hip_on_the_ankle_axis_is_solved_with_the_smallest_offsets() {
+    let mut numbers = Numbers(12);
+    for hip_offset_m in [1e-13, 1e-10, 9e-10] {
+        let leg = Leg {
+            thigh_m: 0.3,
+            shank_m: 0.29,
+            ankle_m: 0.1,
+            hip_offset_m,
+        };
+        for _ in 0..200 {
+            let mut q: [f64; 6] = numbers.joints();
+            // K = 0.
+            let (s, c) = q[3].sin_cos();
+            q[4] = (leg.thigh_m * c + leg.shank_m).atan2(leg.thigh_m * s);
+            let pose = leg.forward(&q);
+            // The same with the hip exactly on the axis.
+            let rotation = pose.rotation;
+            let on_axis = LimbPose {
+                position: -(rotation * Vector3::new(-leg.ankle_m, 0.0, seen(&pose, leg.ankle_m).z)),
+                ..pose
+            };
+            for pose in [pose, on_axis] {
+                let mut all = Solutions::default();
+                leg.solve_all(&pose, &q, &mut all).unwrap();
+                for (solution, _) in all.iter() {
+                    let off = error(&leg.forward(solution), &pose);
+                    assert!(off < 2e-7, "{hip_offset_m:e}: {off:e} {solution:?}");
+                }
+                let found = all.iter().any(|(s, _)| distance(s, &q) < 1e-5);
+                assert!(found, "{hip_offset_m:e}: {q:?}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_folded_arm_of_equal_links_does_not_jump() {
     let (_, arm) = arms()[1];
@@ -511,4 +548,38 @@ fn a_folded_arm_of_equal_links_does_not_jump() {
         let away = distance(&found, &previous);
         assert!(away < 1.2e-2, "{away} from {previous:?}: {found:?}");
     }
+}
+
+/// Just beside a stretched elbow, where rounding of the sine needs some slack, no solution misses its pose by more than 2e-7.
+#[test]
+fn a_nearly_stretched_arm_gives_no_solution_that_misses() {
+    let mut accepted = 0;
+    for (name, arm) in arms() {
+        let (l2, l3) = (arm.upper_arm_m, arm.forearm_m);
+        for elbow in [0.0, 1e-7, 2e-7, 3e-7, 4e-7, 4.9e-7, 5.1e-7, 6e-7_f64] {
+            for beyond in [1e-9, 1e-8, 3e-8, 1e-7, 1.2e-7, 2e-7] {
+                let z = l2 * elbow.sin() + beyond;
+                let across = ((l2 + l3 * elbow.cos()).powi(2) + (l3 * elbow.sin()).powi(2) - z * z).sqrt();
+                let turn = 1e6 * elbow + 1e7 * beyond;
+                let seen = Vector3::new(across * turn.cos() - arm.hand_m, across * turn.sin(), z);
+                let rotation = *nalgebra::Rotation3::from_euler_angles(0.3 + turn, -0.8, 1.1 * turn).matrix();
+                let pose = LimbPose {
+                    rotation,
+                    position: -(rotation * seen),
+                };
+                let mut all = Solutions::default();
+                if arm.solve_all(&pose, &[0.2; 6], &mut all).is_ok() {
+                    accepted += 1;
+                    for (q, _) in all.iter() {
+                        let found = arm.forward(q);
+                        let off = (found.rotation - rotation)
+                            .amax()
+                            .max((found.position - pose.position).amax());
+                        assert!(off < 2e-7, "{name} {elbow:e} {beyond:e}: {off:e}");
+                    }
+                }
+            }
+        }
+    }
+    assert!(accepted > 10, "{accepted}");
 }

@@ -5,8 +5,8 @@
 
 use ik_core::kinematics::{Page, forward};
 use ik_core::robot::{EMBEDDED, Robot, Root, UrdfOptions, embedded};
-use ik_methods::reverse_decoupling::Limb;
 use ik_methods::reverse_decoupling::analyser::{LimbReport, Verdict, limbs};
+use ik_methods::reverse_decoupling::{Limb, Unsolved};
 use nalgebra::Isometry3;
 use std::f64::consts::PI;
 use std::path::Path;
@@ -117,4 +117,57 @@ fn the_limbs_of_the_reference_robots_are_solved() {
         count += check(&Robot::from_urdf_file(&file, &options).unwrap());
     }
     assert_eq!(count, 12);
+}
+
+#[test]
+fn a_pose_that_is_not_rigid_is_refused_by_every_family() {
+    let mut families = 0;
+    for entry in EMBEDDED {
+        let robot = embedded(entry.id).unwrap();
+        for report in limbs(&robot) {
+            let Ok(limb) = Limb::new(&robot, &report) else {
+                continue;
+            };
+            let turn = nalgebra::UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(1.1, 0.0, 0.0, 0.0));
+            let pose = Isometry3::from_parts(nalgebra::Translation3::new(0.1, 0.0, -0.2), turn);
+            let previous = vec![0.1; limb.joints()];
+            let refused = limb.for_each_solution(&pose, &previous, |_, _| {});
+            assert!(
+                matches!(refused, Err(Unsolved::NotRigid { .. })),
+                "{} {}: {refused:?}",
+                entry.id,
+                report.tip_name
+            );
+            families += 1;
+        }
+    }
+    assert!(families >= 20, "{families}");
+}
+
+#[test]
+fn postures_that_place_a_point_are_given_once() {
+    let robot = embedded("bioloid").unwrap();
+    let report = limbs(&robot)
+        .into_iter()
+        .find(|limb| limb.joints.len() == 3)
+        .unwrap();
+    let point = nalgebra::Point3::new(0.0, 0.0, 0.08);
+    let limb = Limb::placing(&robot, &report, &point).unwrap();
+    let mut page = Page::new(&robot);
+    let mut most = 0;
+    for k in 0..200 {
+        forward(&robot, &posture(&robot, k), &mut page);
+        let target = body(&robot, &page, report.base).inverse() * body(&robot, &page, report.tip) * point;
+        let mut all: Vec<Vec<f64>> = Vec::new();
+        let pose = Isometry3::translation(target.x, target.y, target.z);
+        let count = limb
+            .for_each_solution(&pose, &[0.0; 3], |q, _| all.push(q.to_vec()))
+            .unwrap();
+        assert_eq!(count, all.len());
+        for (i, a) in all.iter().enumerate() {
+            assert!(all[..i].iter().all(|b| away(a, b) > 1e-9), "{all:?}");
+        }
+        most = most.max(count);
+    }
+    assert!((2..=4).contains(&most), "{most}");
 }

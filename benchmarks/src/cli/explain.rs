@@ -3,11 +3,12 @@
 use super::{ExplainArgs, Failure};
 use crate::error::InputError;
 use crate::figures::mechanism_svg;
+use crate::limbs::is_limb_suite;
 use crate::records_io::write_atomically;
 use crate::suite::{Case, RobotSpec, Suite, Variation, known_method};
 use ik_core::driver::Driver;
 use ik_core::problem::PhaseId;
-use ik_core::robot::{EMBEDDED, embedded};
+use ik_core::robot::{EMBEDDED, Root, embedded};
 use ik_methods::davies::{
     LinkKind, Mechanism, MechanismBlock, Network, OrientationRates, ReferencePoint, Role,
 };
@@ -20,20 +21,20 @@ const EXPLAINED: [&str; 2] = ["davies", "davies-open"];
 /// Width of a line on a terminal.
 const WIDTH: usize = 100;
 
-/// What stands for the closed forms, which are not registered.
-const CLOSED_FORM: &str = "reverse-decoupling";
+/// What stands for the closed forms of limbs: how they are derived, and the method that uses them.
+const CLOSED_FORM: [&str; 2] = ["reverse-decoupling", "closed-form"];
 
 pub(super) fn explain(args: &ExplainArgs, out: &mut dyn Write) -> Result<(), Failure> {
-    if args.method == CLOSED_FORM {
+    if CLOSED_FORM.contains(&args.method.as_str()) {
         return closed_forms(args, out);
     }
     let entry = known_method(&args.method, "explain")?;
     if !EXPLAINED.contains(&entry.info().id) {
-        let allowed = "davies, davies-open or reverse-decoupling";
+        let allowed = "davies, davies-open or reverse-decoupling (or closed-form)";
         return Err(InputError::value("explain", "method", &args.method, allowed).into());
     }
     let suite = match (&args.suite, &args.robot) {
-        (Some(name), _) => Suite::load(name)?,
+        (Some(name), _) => suite_named(name)?,
         (None, Some(robot)) => suite_of(robot)?,
         (None, None) => unreachable!("one of them is required"),
     };
@@ -77,16 +78,29 @@ pub(super) fn explain(args: &ExplainArgs, out: &mut dyn Write) -> Result<(), Fai
 
 /// Which limbs of a robot have a closed form, and why the others have none.
 fn closed_forms(args: &ExplainArgs, out: &mut dyn Write) -> Result<(), Failure> {
+    if let Some(file) = &args.svg {
+        let allowed = "with davies and davies-open only: limbs have no graph to draw";
+        let place = format!("explain {}", args.method);
+        return Err(InputError::value(&place, "--svg", file.display(), allowed).into());
+    }
     let robot = match (&args.suite, &args.robot) {
         (Some(name), _) => {
-            let suite = Suite::load(name)?;
+            let suite = suite_named(name)?;
             Case::new(&suite, 0, &Variation::default())?
                 .problem
                 .robot_arc()
                 .clone()
         }
+        (None, Some(path)) if path.ends_with(".urdf") => {
+            let spec = RobotSpec::UrdfFile {
+                path: path.clone(),
+                root: Root::default(),
+            };
+            Arc::new(spec.build("explain: --robot")?)
+        }
         (None, Some(id)) => {
             let known = EMBEDDED.iter().map(|robot| robot.id);
+            let known = known.chain(["or the path of a .urdf file"]);
             let robot =
                 embedded(id).map_err(|_| InputError::unknown("explain: --robot", "robot", id, known))?;
             Arc::new(robot)
@@ -123,6 +137,15 @@ fn closed_forms(args: &ExplainArgs, out: &mut dyn Write) -> Result<(), Failure> 
 /// Without the sign of a zero and what rounding leaves beside it.
 fn rounded(value: f64) -> f64 {
     (value * 1e9).round() / 1e9 + 0.0
+}
+
+/// A suite with a problem.
+fn suite_named(name: &str) -> Result<Suite, InputError> {
+    if is_limb_suite(name) {
+        let allowed = "a suite of control steps; of a suite of limbs, --robot with one of its robots";
+        return Err(InputError::value("explain", "--suite", name, allowed));
+    }
+    Suite::load(name)
 }
 
 /// The first embedded suite on a robot.

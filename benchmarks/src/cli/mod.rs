@@ -153,16 +153,17 @@ struct SolveArgs {
     /// Parameter of the method; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// All solutions of a limb's pose, not the nearest alone
+    /// All solutions of a limb's pose, not the nearest alone (of those within limits if there is one)
     #[arg(long, conflicts_with_all = ["method", "set"])]
     all_solutions: bool,
 }
 
 #[derive(Debug, Args)]
 struct ExplainArgs {
-    /// davies, davies-open or reverse-decoupling
+    /// davies, davies-open or reverse-decoupling (also: closed-form)
     method: String,
-    /// Embedded robot; for davies the first suite that has it gives the problem
+    /// Embedded robot, for davies that of the first suite that has it; for reverse-decoupling also the path of a .urdf file,
+    /// whose root is taken as fixed
     #[arg(
         long,
         value_name = "ROBOT",
@@ -173,7 +174,7 @@ struct ExplainArgs {
     /// Suite whose problem is explained: an id or the path of a .toml file
     #[arg(long, value_name = "SUITE")]
     suite: Option<String>,
-    /// Draw the graph into this file
+    /// Draw the graph of davies into this file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
 }

@@ -9,7 +9,7 @@ use super::progress::Progress;
 use super::{DEFAULT_FOLDER, EffortArgs, Everything, Failure, RunArgs, draw};
 use crate::error::InputError;
 use crate::instance::Instance;
-use crate::limbs::{Amount, LIMBS_FILE, LimbStore, LimbSuite, is_limb_suite, limbs_terminal};
+use crate::limbs::{Amount, LIMBS_FILE, LimbStore, LimbSuite, Plan, is_limb_suite, limbs_terminal};
 use crate::machine::{is_pinned, machine, revision};
 use crate::records::{Machine, Row};
 use crate::records_io::{ROWS_FILE, RecordError, RowKey, RowStore, write_atomically, write_trace};
@@ -26,9 +26,10 @@ use std::path::{Path, PathBuf};
 /// Marks the rows of a quick session: they are never taken for those of a full one.
 const QUICK_NOTE: &str = "quick session";
 
-/// All suites into one folder, with traces, figures and summary.
+/// All suites, a quick session those that are not for full ones only, into one folder, with traces, figures and summary.
 pub(super) fn everything(args: &Everything, out: &mut dyn Write) -> Result<(), Failure> {
-    let suites = Suite::load_embedded()?;
+    let mut suites = Suite::load_embedded()?;
+    suites.retain(|suite| !(args.effort.quick && suite.full_only));
     let heats = heats(
         &suites,
         &Selection::default(),
@@ -171,6 +172,9 @@ pub(super) fn run(args: &RunArgs, out: &mut dyn Write) -> Result<(), Failure> {
     }
     write!(out, "{}", summary::terminal_table(&recorder.rows))?;
     write!(out, "{}", limbs_terminal(&limbs.rows))?;
+    for note in plans.iter().flat_map(Plan::notes) {
+        writeln!(out, "note: {note}")?;
+    }
     Ok(tell_kept(recorder.kept + limbs.kept, out)?)
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Failure, SolveArgs, plan};
 use crate::error::InputError;
-use crate::instance::Instance;
+use crate::instance::{self, Instance};
 use crate::limb_pose::{self, LimbPoseFile};
 use serde::Serialize;
 use std::io::Write;
@@ -13,7 +13,7 @@ pub(super) fn solve(args: &SolveArgs, out: &mut dyn Write) -> Result<(), Failure
         file: source.clone(),
         reason: e.to_string(),
     })?;
-    if is_limb_pose(&text) {
+    if schema(&text, &source)? == limb_pose::SCHEMA {
         return solve_limb(args, &text, &source, out);
     }
     if args.all_solutions {
@@ -26,10 +26,31 @@ pub(super) fn solve(args: &SolveArgs, out: &mut dyn Write) -> Result<(), Failure
     print(&instance.solve(&contestant, &source)?, out)
 }
 
-/// Whether the text says that it is the pose of a limb.
-fn is_limb_pose(text: &str) -> bool {
-    let value: Option<serde_json::Value> = serde_json::from_str(text).ok();
-    value.is_some_and(|v| v.get("schema").and_then(|s| s.as_str()) == Some(limb_pose::SCHEMA))
+/// The schema that a file says to have: one of those that can be solved.
+fn schema(text: &str, source: &str) -> Result<&'static str, InputError> {
+    let value: serde_json::Value = serde_json::from_str(text).map_err(|e| InputError::Syntax {
+        file: source.to_owned(),
+        reason: not_json(text, &e),
+    })?;
+    let known = [instance::SCHEMA, limb_pose::SCHEMA];
+    let found = value.get("schema");
+    let same = |schema: &&str| found.and_then(|found| found.as_str()) == Some(*schema);
+    known.into_iter().find(same).ok_or_else(|| {
+        let found = found.map_or("missing".to_owned(), ToString::to_string);
+        InputError::value(source, "schema", found, &known.join(", "))
+    })
+}
+
+/// The parser's words, but for numbers that other languages write and JSON does not have.
+fn not_json(text: &str, error: &serde_json::Error) -> String {
+    let (line, column) = (error.line(), error.column());
+    let at = text.lines().nth(line.saturating_sub(1));
+    let rest = at.and_then(|at| at.get(column.saturating_sub(1)..));
+    let rest = rest.unwrap_or_default().to_ascii_lowercase();
+    if ["nan", "inf"].iter().any(|word| rest.starts_with(word)) {
+        return format!("not a number at line {line} column {column}");
+    }
+    error.to_string()
 }
 
 fn solve_limb(args: &SolveArgs, text: &str, source: &str, out: &mut dyn Write) -> Result<(), Failure> {
@@ -37,10 +58,12 @@ fn solve_limb(args: &SolveArgs, text: &str, source: &str, out: &mut dyn Write) -
         let allowed = "neither --method nor --set: a limb's pose has a closed form";
         return Err(InputError::value(source, "--method or --set", "given", allowed).into());
     }
-    let mut answer = LimbPoseFile::parse(text, source)?.solve(source)?;
-    if !args.all_solutions {
-        answer.solutions.truncate(1);
-    }
+    let answer = LimbPoseFile::parse(text, source)?.solve(source)?;
+    let answer = if args.all_solutions {
+        answer
+    } else {
+        answer.nearest()
+    };
     print(&answer, out)
 }
 

@@ -90,6 +90,14 @@ pub(super) struct FittedAxis {
 }
 
 impl FittedAxis {
+    /// Values between which a line is drawn; a logarithmic axis puts what is outside on its edge instead.
+    pub(super) fn shown(&self) -> (f64, f64) {
+        match self.scale {
+            Scale::Linear => (self.low, self.high),
+            Scale::Log => (f64::NEG_INFINITY, f64::INFINITY),
+        }
+    }
+
     /// Place of a value as part of the length of the axis, 0…1; values outside are put on the edge.
     pub(super) fn place(&self, value: f64) -> f64 {
         let inside = value.clamp(self.low, self.high);

@@ -5,7 +5,8 @@ use super::painter::Painter;
 use super::panel::{Band, Curve, Level, Panel, TICK_SIZE};
 use super::sheet::{Anchor, Drawing, Key, Point, Sheet, Type, WIDTH, draw, key_width, text_width};
 use super::style::{BLACK, GREY};
-use std::collections::BTreeSet;
+use crate::summary::number;
+use std::collections::{BTreeMap, BTreeSet};
 
 pub(super) const MARGIN: f64 = 12.0;
 pub(super) const TITLE_SIZE: f64 = 15.0;
@@ -120,17 +121,31 @@ impl Figure {
 
     fn all_remarks(&self) -> Vec<String> {
         let mut cuts = BTreeSet::new();
+        let mut leaving: BTreeMap<&str, BTreeMap<&str, f64>> = BTreeMap::new();
         for panel in self.rows.iter().flat_map(|r| &r.panels).filter(|p| !p.is_empty()) {
             let (x, y) = panel.fitted();
             for (axis, fitted) in [(&panel.x, x), (&panel.y, y)] {
                 cuts.extend(fitted.cut_below.map(|c| (axis.label.clone(), rough(c))));
             }
+            for (name, value) in panel.leaving() {
+                let of_axis = leaving.entry(&panel.y.label).or_default();
+                let farthest = of_axis.entry(name).or_default();
+                if value.abs() >= farthest.abs() {
+                    *farthest = value;
+                }
+            }
         }
+        let leaving = leaving.into_iter().flat_map(|(label, curves)| {
+            let named = |(name, value): (&str, f64)| format!("{name} (to {})", number(Some(value)));
+            let curves: Vec<String> = curves.into_iter().map(named).collect();
+            let remark = format!("{label}: leaving the panel: {}.", curves.join(", "));
+            wrapped(&remark.replace("(to -", "(to −"))
+        });
         let cuts = cuts
             .into_iter()
             .map(|(l, c)| format!("{l}: values below {c} are drawn at {c}."));
         let remarks = self.remarks.iter().flat_map(|r| wrapped(r));
-        remarks.chain(cuts).collect()
+        remarks.chain(leaving).chain(cuts).collect()
     }
 }
 

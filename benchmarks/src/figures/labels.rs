@@ -127,7 +127,7 @@ fn is_same_run(a: &Row, b: &Row) -> bool {
 }
 
 /// Whether a row's method ran with its defaults, budget apart.
-fn is_default(row: &Row) -> bool {
+pub(super) fn is_default(row: &Row) -> bool {
     let Ok(entry) = method(&row.method) else {
         return false;
     };

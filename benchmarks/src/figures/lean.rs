@@ -2,10 +2,10 @@
 
 use super::axis::Axis;
 use super::figure::{Figure, PanelRow};
-use super::panel::{Curve, Level, Panel, time_axis};
+use super::panel::{Curve, Level, Panel, common_y, time_axis};
 use super::style::Styles;
 use super::tracking::method_curve;
-use super::{Obstacle, Studio, Traced, over_time, place_of};
+use super::{AXES_OF_SURVIVORS, Obstacle, Studio, Traced, over_time, place_of, survivors};
 
 /// Methods the paper compares; the others are drawn thinner.
 const COMPARED: [&str; 2] = ["ik2", "ik4"];
@@ -32,15 +32,15 @@ pub(super) fn lean(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
         name: format!("hip pitch limit {hip}"),
         value: hip,
     };
+    let row = |title: &str, column: &str, limit: &Level| {
+        let of = |runs: &[&Traced<'_>]| panel(title, column, limit.clone(), runs, &studio.styles);
+        let mut panel = of(&traced.iter().collect::<Vec<_>>());
+        panel.y.range = common_y(&[of(&survivors(&traced))]);
+        PanelRow::new(HEIGHT, vec![panel])
+    };
     let rows = vec![
-        PanelRow::new(
-            HEIGHT,
-            vec![panel("left knee", "LKneeSag", knee, &traced, &studio.styles)],
-        ),
-        PanelRow::new(
-            HEIGHT,
-            vec![panel("left hip pitch", "LHipSag", hip, &traced, &studio.styles)],
-        ),
+        row("left knee", "LKneeSag", &knee),
+        row("left hip pitch", "LHipSag", &hip),
     ];
     let budget = largest.map_or(String::new(), |n| format!(", n = {n}"));
     let title = format!(
@@ -49,11 +49,11 @@ pub(super) fn lean(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
     );
     let remark = "Wide: the two methods the paper compares, ik2 and ik4.";
     Ok(Figure::new(title, rows)
-        .with_remarks(vec![remark.to_owned()])
+        .with_remarks(vec![remark.to_owned(), AXES_OF_SURVIVORS.to_owned()])
         .render()?)
 }
 
-fn panel(title: &str, column: &str, limit: Level, traced: &[Traced<'_>], styles: &Styles) -> Panel {
+fn panel(title: &str, column: &str, limit: Level, traced: &[&Traced<'_>], styles: &Styles) -> Panel {
     let mut panel = Panel::new(title, time_axis(), Axis::linear(&format!("{column} (rad)")));
     panel.levels.push(limit);
     for (rank, one) in traced.iter().enumerate() {

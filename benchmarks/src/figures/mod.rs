@@ -1,6 +1,7 @@
 //! Figures of a results folder as SVG: those of Faraji & Ijspeert, "Singularity-tolerant inverse kinematics for bipedal
 //! robots: an efficient use of computational power to reduce energy consumption" (2017), those of Davies' method on the
-//! Bioloid (`davies_*`), those of closed-form limbs (`closed_form_*`), and overviews over all suites.
+//! Bioloid (`davies_*`), those of the walks of Melson (`melson_*`), what comes of its chain on other robots (`walk_*`), those of
+//! closed-form limbs (`closed_form_*`), and overviews over all suites.
 //!
 //! Everything is drawn from the rows and traces of the folder, and from the embedded suites where a figure shows the
 //! robot, its mechanism or the knots of its walk: the same folder gives the same bytes. Where several rows of a suite differ in Δt, the figures show that of the last.
@@ -21,8 +22,11 @@ mod posture;
 mod regulator;
 mod sheet;
 mod skeleton;
+mod strip;
 mod style;
 mod tracking;
+mod walk;
+mod walked;
 
 use crate::limbs::LIMBS_FILE;
 use crate::records::{Row, Trace};
@@ -159,7 +163,7 @@ fn remove_stale(path: &Path) -> Result<(), RecordError> {
 
 type Paint = fn(&mut Studio<'_>) -> Result<String, Obstacle>;
 
-const FIGURES: [(&str, Paint); 22] = [
+const FIGURES: [(&str, Paint); 31] = [
     ("fig1_squat.svg", tracking::squat),
     ("fig2_stretch.svg", tracking::stretch),
     ("fig2_stretch_fast.svg", tracking::stretch_fast),
@@ -178,6 +182,15 @@ const FIGURES: [(&str, Paint); 22] = [
     ("davies_closure.svg", davies::closure),
     ("davies_condition.svg", davies::condition),
     ("davies_damping.svg", davies::damping),
+    ("melson_fig3_4_5_joints.svg", walk::joints),
+    ("melson_fig6_7_8_strips.svg", walk::melson_strips),
+    ("melson_fig9_poses.svg", walk::poses),
+    ("melson_fig10_drift.svg", walk::drift),
+    ("melson_objectives.svg", walk::objectives),
+    ("melson_zmp.svg", walk::melson_zmp),
+    ("walk_hubo_zmp.svg", walk::hubo_zmp),
+    ("walk_hubo_strip.svg", walk::hubo_strip),
+    ("walk_hubo_methods.svg", walk::hubo_methods),
     ("overview_error.svg", overview::error),
     ("overview_time.svg", overview::time),
     ("overview_majors.svg", overview::majors),
@@ -217,6 +230,23 @@ struct Studio<'a> {
 struct Traced<'a> {
     run: Labelled<'a>,
     trace: Trace,
+}
+
+/// What stands below a figure whose axes are those of [`survivors`].
+const AXES_OF_SURVIVORS: &str = "Linear axes fit the runs that survived. Lines end at the edge of the panel, and leaps over its height are left out.";
+
+/// The runs that axes are fitted to, for one that diverges would make all others one flat line: those that survived, or
+/// all if none did.
+fn survivors<'t, 'a>(traced: &'t [Traced<'a>]) -> Vec<&'t Traced<'a>> {
+    let survived = |one: &&Traced<'_>| {
+        let metrics = one.run.row.metrics.as_ref();
+        metrics.is_some_and(|metrics| metrics.quality.survived)
+    };
+    let survivors: Vec<&Traced<'a>> = traced.iter().filter(survived).collect();
+    if survivors.is_empty() {
+        return traced.iter().collect();
+    }
+    survivors
 }
 
 impl<'a> Studio<'a> {
@@ -320,6 +350,15 @@ fn over_time(trace: &Trace, column: &str) -> Option<Points> {
             .zip(trace.column(column)?)
             .collect(),
     )
+}
+
+/// Points (t, largest value of all columns that end so).
+fn largest_over_time(trace: &Trace, suffix: &str) -> Option<Points> {
+    let t = trace.column("t")?;
+    let ends = |i: &usize| trace.columns[*i].ends_with(suffix);
+    let columns: Vec<usize> = (0..trace.columns.len()).filter(ends).collect();
+    let of_row = |row: &Vec<f64>| columns.iter().map(|i| row[*i]).fold(f64::NAN, f64::max);
+    Some(t.into_iter().zip(trace.rows.iter().map(of_row)).collect())
 }
 
 /// Points (t_k, (q_k − q_{k−1})/(t_k − t_{k−1})), k ≥ 1, of a column; none if the trace lacks it.

@@ -1,7 +1,7 @@
 //! Painting of one panel: frame, grid, ticks, labels, and what it shows.
 
 use super::axis::FittedAxis;
-use super::panel::{Band, Curve, LEVEL, Level, Markers, Panel, TICK_SIZE};
+use super::panel::{Band, Curve, LEVEL, Level, Markers, Panel, TICK_SIZE, between};
 use super::sheet::{Anchor, Drawing, Point, Sheet, Stroke, Type};
 use super::style::{BLACK, Dash, GREY, PALE};
 use plotters::style::RGBColor;
@@ -181,14 +181,16 @@ impl<'a, 'b> Painter<'a, 'b> {
             width: curve.width,
             dash: curve.style.dash,
         };
+        let (low, high) = self.y.shown();
         let is_finite = |p: &Point| p.0.is_finite() && p.1.is_finite();
         for piece in curve.points.split(|p| !is_finite(p)) {
-            let points: Vec<Point> = piece.iter().map(|p| self.at(*p)).collect();
-            if points.len() > 1 {
+            for part in between(piece, (low, high)) {
+                let points: Vec<Point> = part.iter().map(|p| self.at(*p)).collect();
                 self.sheet.line(&points, stroke)?;
             }
         }
-        for index in marked(curve).into_iter().filter(|i| is_finite(&curve.points[*i])) {
+        let is_shown = |p: &Point| is_finite(p) && (low..=high).contains(&p.1);
+        for index in marked(curve).into_iter().filter(|i| is_shown(&curve.points[*i])) {
             let at = self.at(curve.points[index]);
             self.sheet
                 .marker(at, 3.2, curve.style.colour, curve.style.marker)?;

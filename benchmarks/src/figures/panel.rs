@@ -140,6 +140,20 @@ impl Panel {
         )
     }
 
+    /// Curves with values above or below the panel, and the largest of these in size.
+    pub(super) fn leaving(&self) -> Vec<(&str, f64)> {
+        let (low, high) = self.fitted().1.shown();
+        let is_outside = |v: &f64| v.is_finite() && !(low..=high).contains(v);
+        let farthest = |curve: &Curve| {
+            let outside = curve.points.iter().map(|p| p.1).filter(is_outside);
+            outside.max_by(|a, b| a.abs().total_cmp(&b.abs()))
+        };
+        let curves = self.curves.iter();
+        curves
+            .filter_map(|curve| Some((curve.name.as_str(), farthest(curve)?)))
+            .collect()
+    }
+
     /// The axes in a frame of this size, as the aspect asks.
     pub(super) fn fitted_to(&self, width: f64, height: f64) -> (FittedAxis, FittedAxis) {
         let (x, y) = self.fitted();
@@ -208,12 +222,39 @@ impl Level {
 
 /// Gives all panels the vertical range of all their data, so that they can be compared.
 pub(super) fn share_y(panels: &mut [Panel]) {
-    let Some(first) = panels.first() else { return };
+    let range = common_y(panels);
+    panels.iter_mut().for_each(|panel| panel.y.range = range);
+}
+
+/// The vertical range of all data of some panels.
+pub(super) fn common_y(panels: &[Panel]) -> Option<(f64, f64)> {
     let values: Vec<Vec<f64>> = panels.iter().flat_map(Panel::vertical_values).collect();
-    let common = first.y.fit(&values, 6);
-    for panel in panels {
-        panel.y.range = Some((common.low, common.high));
+    let common = panels.first()?.y.fit(&values, 6);
+    Some((common.low, common.high))
+}
+
+/// The parts of a line between two ordinates, cut where it crosses them. Two points that are both outside, or farther apart
+/// than the ordinates, are not joined: what leaps back and forth would fill the panel with upright lines.
+pub(super) fn between(points: &[Point], (low, high): (f64, f64)) -> Vec<Vec<Point>> {
+    let is_inside = |p: Point| (low..=high).contains(&p.1);
+    let mut parts: Vec<Vec<Point>> = Vec::new();
+    let mut goes_on = false;
+    for pair in points.windows(2) {
+        let (a, b) = (pair[0], pair[1]);
+        let is_joined = (is_inside(a) || is_inside(b)) && (b.1 - a.1).abs() <= high - low;
+        let cut = |p: Point| {
+            let y = p.1.clamp(low, high);
+            let x = || a.0 + (b.0 - a.0) * (y - a.1) / (b.1 - a.1);
+            if is_inside(p) { p } else { (x(), y) }
+        };
+        match parts.last_mut().filter(|_| goes_on) {
+            _ if !is_joined => (),
+            Some(part) => part.push(cut(b)),
+            None => parts.push(vec![cut(a), cut(b)]),
+        }
+        goes_on = is_joined && is_inside(b);
     }
+    parts
 }
 
 /// An axis of time.
@@ -224,6 +265,29 @@ pub(super) fn time_axis() -> Axis {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lines_are_cut_where_they_leave_the_panel() {
+        let zigzag = [
+            (0.0, 0.5),
+            (1.0, 1.5),
+            (2.0, -0.5),
+            (3.0, -1.0),
+            (4.0, -0.5),
+            (5.0, 0.5),
+            (6.0, 0.0),
+            (7.0, 9.0),
+            (8.0, 0.5),
+        ];
+        let parts = between(&zigzag, (0.0, 1.0));
+        let expected = [
+            vec![(0.0, 0.5), (0.5, 1.0)],
+            vec![(4.5, 0.0), (5.0, 0.5), (6.0, 0.0)],
+        ];
+        assert_eq!(parts, expected);
+        let all = between(&zigzag, (f64::NEG_INFINITY, f64::INFINITY));
+        assert_eq!(all, [zigzag.to_vec()]);
+    }
 
     #[test]
     fn equal_aspect_widens_one_axis_about_its_middle() {

@@ -3,9 +3,9 @@
 use super::axis::Axis;
 use super::figure::{Figure, PanelRow};
 use super::labels::by_method;
-use super::panel::{Curve, Markers, Panel};
+use super::panel::{Curve, Markers, Panel, common_y};
 use super::style::{BLACK, Dash, Marker, Style, Styles};
-use super::{Obstacle, Points, Studio, Traced, milliseconds};
+use super::{AXES_OF_SURVIVORS, Obstacle, Points, Studio, Traced, milliseconds, survivors};
 use crate::statistics::line_fit;
 
 const SUITE: &str = "coman/posture";
@@ -21,7 +21,7 @@ pub(super) fn posture(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
             "no run with a trace and a torque on {SUITE}"
         )));
     };
-    let (main, others) = curves(&traced, &studio.styles);
+    let (main, others) = curves(&traced.iter().collect::<Vec<_>>(), &studio.styles);
     let fit_points = main.as_ref().map(|m| m.points.clone()).unwrap_or_default();
     let x = Axis::linear("left knee at the start (rad)");
     let mut panel = Panel::new("", x, Axis::linear("mean Στ² for t ≥ 1 s (N²m²)"));
@@ -30,6 +30,12 @@ pub(super) fn posture(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
         .chain(others)
         .chain(fitted(&fit_points))
         .collect();
+    let (main, others) = curves(&survivors(&traced), &studio.styles);
+    let fitting = Panel {
+        curves: main.into_iter().chain(others).collect(),
+        ..panel.clone()
+    };
+    panel.y.range = common_y(&[fitting]);
     let dt = milliseconds(first.run.row.dt_s);
     let title =
         format!("Fig. 7  Static torque from stretched to crouched: {SUITE}, all scenarios, Δt = {dt} ms");
@@ -40,11 +46,11 @@ pub(super) fn posture(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
 }
 
 /// The curve of the paper's method, and those of the others.
-fn curves(traced: &[Traced<'_>], styles: &Styles) -> (Option<Curve>, Vec<Curve>) {
+fn curves(traced: &[&Traced<'_>], styles: &Styles) -> (Option<Curve>, Vec<Curve>) {
     let (mut main, mut others) = (None, Vec::new());
     for group in by_method(traced.iter().map(|t| &t.run)) {
         let of_group = traced.iter().filter(|t| t.run.is_same_method(group[0]));
-        let mut points: Points = of_group.filter_map(knee_and_torque).collect();
+        let mut points: Points = of_group.filter_map(|t| knee_and_torque(t)).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (name, style) = (group[0].label.clone(), styles.of(&group[0].label));
         if (name.as_str(), group[0].n) == (MAIN.0, Some(MAIN.1)) {
@@ -98,7 +104,7 @@ fn fitted(points: &[(f64, f64)]) -> Option<Curve> {
 fn remarks(points: &[(f64, f64)]) -> Vec<String> {
     let meaning = "Στ²: sum over the leg joints of squared quasi-static torques, both soles loaded. Thin: other methods, \
                    both budgets.";
-    let mut remarks = vec![meaning.to_owned()];
+    let mut remarks = vec![meaning.to_owned(), AXES_OF_SURVIVORS.to_owned()];
     if let [first, rest @ ..] = points
         && !rest.is_empty()
     {

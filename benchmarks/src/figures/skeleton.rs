@@ -1,6 +1,6 @@
 //! A robot as a stick figure: bodies joined to their parents' origins, frames at the ends of limbs, soles.
 //!
-//! Sides are told from the neutral configuration, x forwards and y to the left, so that any robot can be drawn.
+//! Sides are told from a configuration in which it stands, x forwards and y to the left, so that any robot can be drawn.
 
 use super::panel::{Curve, Markers};
 use super::style::{Dash, LEFT, RIGHT, Style, TRUNK};
@@ -68,12 +68,13 @@ pub(super) struct Skeleton {
     /// Frame of each body.
     bodies: Vec<FrameId>,
     bones: Vec<Bone>,
-    neutral: Vec<Isometry3<f64>>,
+    /// Poses of all frames while it stands.
+    standing: Vec<Isometry3<f64>>,
 }
 
 impl Skeleton {
-    /// Every body joined to its parent.
-    pub(super) fn new(robot: &Robot) -> Self {
+    /// Every body joined to its parent; sides are those of the configuration `standing` (length nq).
+    pub(super) fn new(robot: &Robot, standing: &[f64]) -> Self {
         let bodies = robot
             .bodies()
             .iter()
@@ -86,7 +87,7 @@ impl Skeleton {
         let mut skeleton = Self {
             bodies,
             bones: Vec::new(),
-            neutral: poses(robot, &robot.neutral()),
+            standing: poses(robot, standing),
         };
         for (i, joint) in robot.joints().iter().enumerate() {
             skeleton.join(joint.parent, skeleton.bodies[i + 1]);
@@ -115,7 +116,7 @@ impl Skeleton {
 
     fn join(&mut self, parent: usize, to: FrameId) {
         let from = self.bodies[parent];
-        let between = self.neutral[to.0].translation.vector - self.neutral[from.0].translation.vector;
+        let between = self.standing[to.0].translation.vector - self.standing[from.0].translation.vector;
         if between.norm() < LEAST_BONE_M {
             return;
         }
@@ -127,7 +128,7 @@ impl Skeleton {
     }
 
     fn side(&self, frame: FrameId) -> Side {
-        let y = self.neutral[frame.0].translation.y;
+        let y = self.standing[frame.0].translation.y;
         if y < -MIDDLE_M {
             Side::Right
         } else if y > MIDDLE_M {
@@ -201,7 +202,7 @@ mod tests {
     #[test]
     fn bones_have_the_lengths_of_the_robot_and_the_sides_mirror_each_other() {
         let robot = embedded("bioloid").unwrap();
-        let mut skeleton = Skeleton::new(&robot);
+        let mut skeleton = Skeleton::new(&robot, &robot.neutral());
         skeleton.end(&robot, "r_hand");
         skeleton.sole(&robot, "r_foot", [0.052, 0.032]);
         let q = robot.neutral();
@@ -226,7 +227,7 @@ mod tests {
     #[test]
     fn bones_keep_their_lengths_when_the_robot_moves() {
         let robot = embedded("bioloid").unwrap();
-        let skeleton = Skeleton::new(&robot);
+        let skeleton = Skeleton::new(&robot, &robot.neutral());
         let mut q = robot.neutral();
         // About y only: in the side view nothing is foreshortened.
         for name in ["r_hip_pitch", "r_knee_pitch"] {

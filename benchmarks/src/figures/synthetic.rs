@@ -1,7 +1,10 @@
 //! Made-up rows and traces of the shape a full run has, for the tests of figures and tables.
 
+use crate::machine::machine;
 use crate::records::{Effort, Machine, Metrics, Quality, Row, SCHEMA, TerminationRecord, Trace};
 use crate::records_io::{ROWS_FILE, RowStore, write_trace};
+use crate::runner::{Session, Timing, run_case};
+use crate::suite::{Case, Selection, Suite, Variation, lineup};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
@@ -244,4 +247,47 @@ fn trace(suite: &str, scenario: &str, floor: f64, lag: f64, us: f64) -> Trace {
         knee_before = knee;
     }
     Trace { columns, rows }
+}
+
+/// Runs methods on scenarios of an embedded suite at a time step (s), rows and traces into a folder.
+pub(crate) fn run_into(
+    dir: &Path,
+    (id, scenarios): (&str, &[&str]),
+    (methods, dt_s): (&[&str], f64),
+    set: &str,
+) {
+    let suite = Suite::load(id).unwrap();
+    let selection = Selection {
+        methods: methods.iter().map(|id| (*id).to_owned()).collect(),
+        set: toml::from_str(set).unwrap(),
+    };
+    let contestants = lineup(&suite, &selection).unwrap();
+    let session = Session {
+        revision: "0123abc".to_owned(),
+        machine: machine(),
+        timing: Timing::QUICK,
+        notes: Vec::new(),
+    };
+    let variation = Variation {
+        dt_s: Some(dt_s),
+        ..Variation::default()
+    };
+    let mut store = RowStore::open(dir).unwrap();
+    for (index, scenario) in suite.scenarios.iter().enumerate() {
+        if !scenarios.contains(&scenario.id.as_str()) {
+            continue;
+        }
+        let case = Case::new(&suite, index, &variation).unwrap();
+        let finished = run_case(&case, &contestants, &session, &|_| {});
+        for (i, finished) in finished.into_iter().enumerate() {
+            let name = format!("traces/{}-{}-{i}.csv", suite.id.replace('/', "-"), scenario.id);
+            let trace = finished.trace(&case).unwrap();
+            write_trace(&dir.join(&name), &trace).unwrap();
+            let row = Row {
+                trace: Some(name),
+                ..finished.row
+            };
+            store.push(row).unwrap();
+        }
+    }
 }

@@ -1,5 +1,6 @@
 use super::davies::tests::write_walk;
 use super::synthetic::{folder, row, write_results};
+use super::walk::tests::write_walks;
 use super::*;
 use crate::records_io::{RowStore, write_trace};
 
@@ -35,11 +36,15 @@ fn a_full_run_gives_every_figure_with_its_axes_and_methods() {
     let dir = folder("full");
     write_results(&dir);
     write_walk(&dir);
+    write_walks(&dir);
     let drawn = draw_into(&dir);
     assert_eq!(drawn.files.len(), FIGURES.len(), "{:?}", drawn.notes);
     assert_eq!(
         drawn.notes,
-        ["penalty-cg n=15 on coman/lean/D: the method declined"]
+        [
+            "penalty-cg n=15 on coman/lean/D: the method declined",
+            "no run of clik with a trace on melson/long-walk/S3"
+        ]
     );
     let expected: [(&str, &[&str]); 8] = [
         (
@@ -251,6 +256,36 @@ fn samples_that_are_not_finite_interrupt_a_curve() {
 }
 
 #[test]
+fn a_run_that_diverges_leaves_the_panel_to_the_survivors() {
+    let dir = folder("diverging");
+    write_results(&dir);
+    let draw = |name: &str| {
+        draw_into(&dir);
+        figure(&dir, name)
+    };
+    let rows = read_rows(&dir.join(ROWS_FILE)).unwrap().rows;
+    for (name, suite, column) in [
+        ("fig2_stretch.svg", "coman/stretch", "LKneeSag"),
+        ("fig4_lean.svg", "coman/lean", "LHipSag"),
+    ] {
+        assert!(!draw(name).contains("leaving the panel"), "{name}");
+        let wild = |row: &&Row| row.suite == suite && row.method == "a-later-one";
+        let mut wild = rows.iter().find(wild).unwrap().clone();
+        let path = dir.join(wild.trace.as_ref().unwrap());
+        let mut trace = read_trace(&path).unwrap();
+        let at = trace.columns.iter().position(|c| c == column).unwrap();
+        trace.rows.iter_mut().for_each(|row| row[at] *= 1e4);
+        write_trace(&path, &trace).unwrap();
+        wild.metrics.as_mut().unwrap().quality.survived = false;
+        RowStore::open(&dir).unwrap().push(wild).unwrap();
+        let after = draw(name);
+        assert!(after.contains("leaving the panel: a-later-one (to "), "{name}");
+        assert!(after.contains(AXES_OF_SURVIVORS), "{name}");
+    }
+    std::fs::remove_dir_all(dir).unwrap();
+}
+
+#[test]
 fn a_malformed_trace_is_an_error_that_names_its_place() {
     let dir = single("malformed", &SQUAT, &[&[0.0, 0.0, 0.0, 0.0]]);
     std::fs::write(dir.join("traces/a.csv"), "t,com_error_m\n0,zero\n").unwrap();
@@ -277,4 +312,15 @@ fn a_suite_is_shown_with_the_time_step_of_its_last_row() {
     ];
     let steps: Vec<f64> = of_last_dt(rows).iter().map(|r| r.dt_s).collect();
     assert_eq!(steps, [0.01, 0.005]);
+}
+
+#[test]
+fn the_largest_of_all_tasks_counts_and_rates_do_not() {
+    let columns = ["t", "a_error_m", "b_error_m", "a_error_rad", "com_rate_error_m_s"];
+    let trace = Trace {
+        columns: columns.map(str::to_owned).to_vec(),
+        rows: vec![vec![0.0, 1.0, 2.0, 3.0, 9.0], vec![0.5, 5.0, 4.0, 3.5, 9.0]],
+    };
+    let largest = largest_over_time(&trace, "_error_m");
+    assert_eq!(largest, Some(vec![(0.0, 2.0), (0.5, 5.0)]));
 }

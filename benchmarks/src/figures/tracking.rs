@@ -3,9 +3,9 @@
 use super::axis::{Axis, Scale};
 use super::figure::{Figure, PanelRow};
 use super::labels::Labelled;
-use super::panel::{Curve, Level, Markers, Panel, share_y, time_axis};
+use super::panel::{Curve, Level, Markers, Panel, common_y, share_y, time_axis};
 use super::style::{BLACK, Dash, Marker, Style, Styles};
-use super::{Obstacle, Points, Studio, Traced, over_time, place_of};
+use super::{AXES_OF_SURVIVORS, Obstacle, Points, Studio, Traced, over_time, place_of, survivors};
 use crate::records::Trace;
 use crate::statistics::median_filtered;
 
@@ -178,15 +178,28 @@ fn tracking(
         "Step times median-filtered over {TIME_WINDOW} samples. Methods without a budget n are shown in every column."
     );
     let title = format!("{title}: {}", place_of(&first.run));
-    Ok(Figure::new(title, rows).with_remarks(vec![remark]).render()?)
+    let mut remarks = vec![remark];
+    if channels.iter().any(|channel| channel.scale == Scale::Linear) {
+        remarks.push(AXES_OF_SURVIVORS.to_owned());
+    }
+    Ok(Figure::new(title, rows).with_remarks(remarks).render()?)
 }
 
 fn channel_row(channel: &Channel, traced: &[Traced<'_>], columns: &[Column], styles: &Styles) -> PanelRow {
-    let panels = columns
-        .iter()
-        .map(|column| channel_panel(channel, traced, column, styles));
-    let mut panels: Vec<Panel> = panels.collect();
-    share_y(&mut panels);
+    let of = |runs: &[&Traced<'_>]| -> Vec<Panel> {
+        let panels = columns.iter();
+        panels
+            .map(|column| channel_panel(channel, runs, column, styles))
+            .collect()
+    };
+    let mut panels = of(&traced.iter().collect::<Vec<_>>());
+    match channel.scale {
+        Scale::Log => share_y(&mut panels),
+        Scale::Linear => {
+            let range = common_y(&of(&survivors(traced)));
+            panels.iter_mut().for_each(|panel| panel.y.range = range);
+        }
+    }
     PanelRow::new(ROW_HEIGHT, panels)
 }
 
@@ -213,7 +226,7 @@ fn columns(traced: &[Traced<'_>]) -> Vec<Column> {
     budgets.into_iter().take(MAX_COLUMNS).map(column).collect()
 }
 
-fn channel_panel(channel: &Channel, traced: &[Traced<'_>], column: &Column, styles: &Styles) -> Panel {
+fn channel_panel(channel: &Channel, traced: &[&Traced<'_>], column: &Column, styles: &Styles) -> Panel {
     let mut panel = Panel::new("", time_axis(), Axis::new(channel.label, channel.scale));
     panel.levels.extend(channel.level.map(|(name, value)| Level {
         name: name.to_owned(),

@@ -156,7 +156,9 @@ fn held(found: &GridFindings, demands: Demands, solutions: Option<u32>) -> bool 
                 && (solutions.is_none() || found.compared == 0 || found.distinct_compared_min == solutions)
         }
     };
-    found.unsolved == 0
+    // Where nothing was compared, nothing has been shown.
+    found.compared > 0
+        && found.unsolved == 0
         && found.not_finite == 0
         && found.error_max_m < demands.error
         && found.error_max_rad < demands.error

@@ -98,8 +98,11 @@ impl Plan {
             let limbs = Subject::of(&robot, &suite.source)?;
             if limbs.is_empty() {
                 let field = format!("robots[{i}]");
-                let allowed = "a robot with a limb in closed form; `explain reverse-decoupling` says why others have none";
-                return Err(InputError::value(&suite.source, &field, robot.name(), allowed));
+                let allowed = format!(
+                    "a robot with a limb in closed form; `ik-bench explain closed-form --robot {}` says why it has none",
+                    spec.argument()
+                );
+                return Err(InputError::value(&suite.source, &field, robot.name(), &allowed));
             }
             subjects.extend(limbs);
         }
@@ -130,6 +133,25 @@ impl Plan {
     /// What is to be done, limb by limb.
     pub fn jobs(&self) -> &[Job] {
         &self.jobs
+    }
+
+    /// What the rows do not say: robots without any.
+    pub fn notes(&self) -> Vec<String> {
+        let mut without: Vec<&str> = Vec::new();
+        for (subject, limb) in self.subjects.iter().enumerate() {
+            let of_robot = |job: &&Job| self.subjects[job.subject].robot.name() == limb.robot.name();
+            let is_first = subject == 0 || self.subjects[subject - 1].robot.name() != limb.robot.name();
+            if is_first && !self.jobs.iter().any(|job| of_robot(&job)) {
+                without.push(limb.robot.name());
+            }
+        }
+        let note = |robot: &str| {
+            format!(
+                "{}: no rows of {robot}: all its limbs are of general families, whose singular sets have no names",
+                self.suite.id
+            )
+        };
+        without.into_iter().map(note).collect()
     }
 
     fn list(&self) -> Result<Vec<Job>, InputError> {

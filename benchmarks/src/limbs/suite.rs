@@ -1,6 +1,6 @@
 //! Limb suites as they are written: robots and one study, as TOML.
 
-use crate::error::{InputError, finite, positive};
+use crate::error::InputError;
 use crate::suite::{RobotSpec, check_id};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -172,10 +172,14 @@ pub const EMBEDDED: &[(&str, &str)] = &[
     ),
 ];
 
-/// Whether a name on the command line is that of a limb suite: an embedded id, or a TOML file with a `study`. A file that
-/// cannot be read or parsed is not.
+/// Whether a name on the command line is that of a limb suite: an embedded id, or a TOML file with a `study`, or with what
+/// else only these have and without a problem. A file that cannot be read or parsed is not.
 pub fn is_limb_suite(name: &str) -> bool {
-    let is_study = |text: String| text.parse::<toml::Table>().is_ok_and(|t| t.contains_key("study"));
+    let has = |table: &toml::Table, keys: &[&str]| keys.iter().any(|key| table.contains_key(*key));
+    let of_limbs = |table: toml::Table| {
+        has(&table, &["study"]) || (has(&table, &["robots", "limbs", "seed"]) && !has(&table, &["problem"]))
+    };
+    let is_study = |text: String| text.parse().is_ok_and(of_limbs);
     EMBEDDED.iter().any(|(id, _)| *id == name)
         || (name.ends_with(".toml") && std::fs::read_to_string(name).is_ok_and(is_study))
 }
@@ -209,6 +213,7 @@ impl LimbSuite {
     /// # Errors
     /// Text that is no limb suite, with line and column; numbers out of their range.
     pub fn parse(text: &str, source: &str, folder: &Path) -> Result<Self, InputError> {
+        check_one_study(text, source)?;
         let syntax = |e: toml::de::Error| InputError::Syntax {
             file: source.to_owned(),
             reason: e.to_string().trim_end().to_owned(),
@@ -230,18 +235,52 @@ impl LimbSuite {
     }
 }
 
-/// Largest whole grid, number of draws, paths or cells: what fits into memory and some minutes.
-const MOST: usize = 1_000_000;
+/// A table of studies holds one. Text that is no TOML, or has no such table, is left to the parser.
+fn check_one_study(text: &str, source: &str) -> Result<(), InputError> {
+    let table: toml::Table = text.parse().unwrap_or_default();
+    let Some(study) = table.get("study").and_then(toml::Value::as_table) else {
+        return Ok(());
+    };
+    let found = match study.len() {
+        0 => "empty".to_owned(),
+        1 => return Ok(()),
+        _ => study.keys().cloned().collect::<Vec<_>>().join(", "),
+    };
+    let allowed = "exactly one of grid, continuity, reach";
+    Err(InputError::value(source, "study", found, allowed))
+}
 
-fn count(source: &str, field: &str, value: usize, least: usize) -> Result<(), InputError> {
-    if (least..=MOST).contains(&value) {
+/// Largest whole grid, number of draws, paths or cells of a slice, and of a study's poses per set: what fits into memory and
+/// some minutes.
+const MOST: usize = 1_000_000;
+/// A turn and a little (rad).
+const TURN_RAD: f64 = 6.3;
+/// Largest number of cells along either axis: [`MOST`] cells.
+const MOST_CELLS: usize = 1_000;
+/// Poses of the off-axis grid are this far (degrees) at least from where indicators vanish: 0, 90, 180 and 270 degrees.
+const BESIDE_DEG: f64 = 1.0;
+
+fn count(source: &str, field: &str, value: usize, (least, most): (usize, usize)) -> Result<(), InputError> {
+    if (least..=most).contains(&value) {
         return Ok(());
     }
     Err(InputError::value(
         source,
         field,
         value,
-        &format!("{least} to {MOST}"),
+        &format!("{least} to {most}"),
+    ))
+}
+
+fn within(source: &str, field: &str, value: f64, (least, most): (f64, f64)) -> Result<(), InputError> {
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    Err(InputError::value(
+        source,
+        field,
+        value,
+        &format!("{least} to {most}"),
     ))
 }
 
@@ -255,19 +294,43 @@ fn check_step(source: &str, field: &str, step_deg: f64) -> Result<(), InputError
     Err(InputError::value(source, field, step_deg, allowed))
 }
 
+impl OffAxis {
+    fn check(self, source: &str) -> Result<(), InputError> {
+        let field = "study.grid.off_axis.offset_deg";
+        check_step(source, "study.grid.off_axis.step_deg", self.step_deg)?;
+        within(source, field, self.offset_deg, (-360.0, 360.0))?;
+        let values =
+            (0..(360.0 / self.step_deg).round() as usize).map(|i| self.offset_deg + self.step_deg * i as f64);
+        let from_axis = |angle: f64| (angle - 90.0 * (angle / 90.0).round()).abs();
+        match values.into_iter().find(|angle| from_axis(*angle) < BESIDE_DEG) {
+            Some(_) => {
+                let allowed = format!(
+                    "an offset that keeps a grid of {} degrees at least {BESIDE_DEG} degree from all multiples of 90",
+                    self.step_deg
+                );
+                Err(InputError::value(source, field, self.offset_deg, &allowed))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
 impl GridSpec {
     fn check(&self, source: &str) -> Result<(), InputError> {
+        if self.on_axis_deg.is_empty() {
+            let field = "study.grid.on_axis_deg";
+            return Err(InputError::value(source, field, "empty", "at least one step"));
+        }
         for (i, step) in self.on_axis_deg.iter().enumerate() {
             check_step(source, &format!("study.grid.on_axis_deg[{i}]"), *step)?;
         }
-        check_step(source, "study.grid.off_axis.step_deg", self.off_axis.step_deg)?;
-        finite(source, "study.grid.off_axis.offset_deg", self.off_axis.offset_deg)?;
+        self.off_axis.check(source)?;
         for (name, counts) in [("full", &self.full), ("quick", &self.quick)] {
             let field = |of: &str| format!("study.grid.{name}.{of}");
-            count(source, &field("whole_up_to"), counts.whole_up_to, 1)?;
-            count(source, &field("sampled"), counts.sampled, 1)?;
-            count(source, &field("random"), counts.random, 1)?;
-            count(source, &field("timed"), counts.timed, 1)?;
+            count(source, &field("whole_up_to"), counts.whole_up_to, (1, MOST))?;
+            count(source, &field("sampled"), counts.sampled, (1, MOST))?;
+            count(source, &field("random"), counts.random, (1, MOST))?;
+            count(source, &field("timed"), counts.timed, (1, MOST))?;
         }
         Ok(())
     }
@@ -286,9 +349,11 @@ impl ContinuitySpec {
             }
         }
         for (name, counts) in [("full", &self.full), ("quick", &self.quick)] {
-            count(source, &field(&format!("{name}.paths")), counts.paths, 1)?;
-            if counts.steps < 2 || counts.steps % 2 == 1 || counts.steps > MOST {
-                let allowed = format!("an even number from 2 to {MOST}");
+            count(source, &field(&format!("{name}.paths")), counts.paths, (1, MOST))?;
+            // Every path has so many.
+            let most = MOST / counts.paths;
+            if counts.steps < 2 || counts.steps % 2 == 1 || counts.steps > most {
+                let allowed = format!("an even number from 2 to {most}");
                 let of = field(&format!("{name}.steps"));
                 return Err(InputError::value(source, &of, counts.steps, &allowed));
             }
@@ -299,27 +364,26 @@ impl ContinuitySpec {
 
 impl ReachSpec {
     fn check(&self, source: &str) -> Result<(), InputError> {
-        positive(source, "study.reach.beyond", self.beyond)?;
+        within(source, "study.reach.beyond", self.beyond, (0.01, 10.0))?;
         for (i, slice) in self.slices.iter().enumerate() {
             for (k, angle) in slice.rotation_rpy_rad.iter().enumerate() {
                 let field = format!("study.reach.slices[{i}].rotation_rpy_rad[{k}]");
-                finite(source, &field, *angle)?;
+                within(source, &field, *angle, (-TURN_RAD, TURN_RAD))?;
             }
         }
         for (i, posture) in self.postures.iter().enumerate() {
             for (k, angle) in posture.joints_deg.iter().enumerate() {
-                finite(
-                    source,
-                    &format!("study.reach.postures[{i}].joints_deg[{k}]"),
-                    *angle,
-                )?;
+                let field = format!("study.reach.postures[{i}].joints_deg[{k}]");
+                within(source, &field, *angle, (-360.0, 360.0))?;
             }
         }
         for (name, counts) in [("full", &self.full), ("quick", &self.quick)] {
             let field = |of: &str| format!("study.reach.{name}.{of}");
-            count(source, &field("distances"), counts.distances, 2)?;
-            count(source, &field("orientations"), counts.orientations, 1)?;
-            count(source, &field("cells"), counts.cells, 2)?;
+            count(source, &field("distances"), counts.distances, (2, MOST))?;
+            // Every orientation is tried at every distance.
+            let most = MOST / counts.distances;
+            count(source, &field("orientations"), counts.orientations, (1, most))?;
+            count(source, &field("cells"), counts.cells, (2, MOST_CELLS))?;
         }
         Ok(())
     }

@@ -314,9 +314,63 @@ fn bad_suites_name_file_field_and_what_is_allowed() {
         GRID,
         "\"arm6\"",
         "\"arm7\"",
-        &["robots[6]", "arm7", "explain reverse-decoupling"],
+        &["robots[6]", "arm7", "explain closed-form --robot arm7"],
     );
     refused(GRID, "closed-form/grid", "closed form", &["id"]);
+    refused(
+        GRID,
+        "[30, 45, 60]",
+        "[]",
+        &["study.grid.on_axis_deg = empty", "at least one"],
+    );
+    refused(
+        GRID,
+        "step_deg = 30, offset_deg = 7.3",
+        "step_deg = 45, offset_deg = 45",
+        &["study.grid.off_axis.offset_deg = 45", "multiples of 90"],
+    );
+    refused(
+        GRID,
+        "[study.grid]",
+        "[study]",
+        &["study = ", "exactly one of grid"],
+    );
+    refused(
+        CONTINUITY,
+        "[study.continuity]",
+        "[study.reach]\n[study.continuity]",
+        &["study = continuity, reach", "exactly one of grid"],
+    );
+    refused(
+        CONTINUITY,
+        "steps = 200",
+        "steps = 100000",
+        &["study.continuity.full.steps = 100000", "2 to 50000"],
+    );
+    refused(
+        REACH,
+        "beyond = 1.05",
+        "beyond = 1e9",
+        &["study.reach.beyond = 1000000000", "0.01 to 10"],
+    );
+    refused(
+        REACH,
+        "cells = 81",
+        "cells = 100000",
+        &["study.reach.full.cells = 100000", "2 to 1000"],
+    );
+    refused(
+        REACH,
+        "orientations = 2000",
+        "orientations = 20000",
+        &["study.reach.full.orientations = 20000", "1 to 16666"],
+    );
+    refused(
+        REACH,
+        "[0.4, 0.9, 0.3]",
+        "[0.4, 9e9, 0.3]",
+        &["study.reach.slices[1].rotation_rpy_rad[1]", "-6.3 to 6.3"],
+    );
     refused(
         CONTINUITY,
         "turn_rad = 0.8",
@@ -360,6 +414,21 @@ fn bad_suites_name_file_field_and_what_is_allowed() {
         "\"palm\"",
         &["study.reach.postures[1]", "hubo/r_palm"],
     );
+}
+
+#[test]
+fn robots_without_a_row_are_noted() {
+    let robots = "{ embedded = \"bioloid\" },\n]";
+    let more = CONTINUITY.replace(
+        robots,
+        "{ embedded = \"bioloid\" },\n    { embedded = \"coman\" },\n]",
+    );
+    let notes = plan(&more).notes();
+    assert!(
+        notes.len() == 1 && notes[0].contains("no rows of coman"),
+        "{notes:?}"
+    );
+    assert!(plan(CONTINUITY).notes().is_empty());
 }
 
 #[test]

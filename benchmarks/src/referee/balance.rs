@@ -36,6 +36,14 @@ pub enum Foot {
 }
 
 impl Foot {
+    /// The other one.
+    pub(crate) fn other(self) -> Self {
+        match self {
+            Self::Right => Self::Left,
+            Self::Left => Self::Right,
+        }
+    }
+
     /// Whether it is among the feet on the ground.
     fn supports(self, support: Support) -> bool {
         match support {
@@ -169,6 +177,10 @@ impl Balance {
         self.polygon.signed_distance(&self.gcom)
     }
 
+    pub(super) fn cart_zmp_margin_m(&self) -> f64 {
+        self.polygon.signed_distance(&self.cart_zmp)
+    }
+
     pub(super) fn zmp_margin_m(&self) -> Option<f64> {
         self.zmp.map(|zmp| self.polygon.signed_distance(&zmp))
     }
@@ -192,12 +204,7 @@ pub(super) fn judge_balance(referee: &Referee, readable: &Readable<'_>, dt_s: f6
         .unwrap_or_default();
     let least = |margins: Vec<f64>| margins.into_iter().reduce(f64::min);
     quality.gcom_margin_min_m = least(samples.iter().map(Balance::gcom_margin_m).collect());
-    quality.cart_zmp_margin_min_m = least(
-        inner
-            .iter()
-            .map(|b| b.polygon.signed_distance(&b.cart_zmp))
-            .collect(),
-    );
+    quality.cart_zmp_margin_min_m = least(inner.iter().map(Balance::cart_zmp_margin_m).collect());
     // One sample without a zero-moment point leaves no least margin: the robot could not have done this.
     quality.zmp_margin_min_m = inner
         .iter()

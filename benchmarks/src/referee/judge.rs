@@ -5,6 +5,7 @@ use super::balance::judge_balance;
 use super::limits::{ellipse_value, polygon_excess, position_violation};
 use super::tasks::{TaskError, hard_then_soft, jacobian, rate_of, task_error};
 use super::torque::static_torques;
+use super::walk::judge_walk;
 use super::{Posture, Readable, Referee, Run, Sample};
 use crate::records::Quality;
 use faer::MatRef;
@@ -44,6 +45,7 @@ pub(super) fn judge(referee: &Referee, run: &Run<'_>) -> Quality {
     quality.singularity_exit_s = exit_time(referee, &readable, run.dt_s);
     quality.torque_squared_mean_n2m2 = torque_squared_mean(referee, &readable);
     judge_balance(referee, &readable, run.dt_s, &mut quality);
+    judge_walk(referee, &readable, run, &mut quality);
     quality.survived = readable.complete
         && survives(
             &quality,
@@ -84,6 +86,10 @@ impl Spread {
         self.squares += value * value;
         self.count += 1;
         self.largest = self.largest.max(value);
+    }
+
+    pub(super) fn largest(&self) -> f64 {
+        self.largest
     }
 
     pub(super) fn rms(&self) -> Option<f64> {

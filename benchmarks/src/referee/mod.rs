@@ -1,7 +1,7 @@
 //! The referee: recomputes every quality number of a run from the returned configurations alone.
 //!
 //! It judges with its own, deliberately simple kinematics (`tree.rs`), its own error measures (`tasks.rs`),
-//! boundary conditions (`limits.rs`), torques (`torque.rs`) and balance (`balance.rs`). What a method says about itself is never
+//! boundary conditions (`limits.rs`), torques (`torque.rs`), balance (`balance.rs`) and objectives (`walk.rs`). What a method says about itself is never
 //! read, except by [`Referee::own_stationarity`], which checks such a claim.
 //!
 //! A run is judged as far as it can be read: up to the first sample that is no configuration (wrong length, a
@@ -21,10 +21,12 @@ mod tests;
 mod torque;
 mod trace;
 mod tree;
+mod walk;
 
 pub use balance::{Foot, Sole};
 pub use certificate::{Certificate, CertifiedStep, OwnStationarity};
 pub use trace::StepEfforts;
+pub use walk::WalkReference;
 
 use crate::records::{Quality, Trace};
 use crate::trajectory::Support;
@@ -55,6 +57,8 @@ pub struct Run<'a> {
     pub phases: &'a [PhaseId],
     /// Feet on the ground at each sample k ≥ 0; empty: always both.
     pub support: &'a [Support],
+    /// What a walk by preview control is compared with; none: nothing walks so.
+    pub walk: Option<&'a WalkReference>,
 }
 
 /// What a suite wants to be judged.

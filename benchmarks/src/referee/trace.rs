@@ -4,8 +4,10 @@ use super::balance::{Balance, balance};
 use super::judge::com_rate_error;
 use super::tasks::{target_of, task_error, tracked_frames, tracked_point};
 use super::torque::static_torques;
+use super::walk::{support_torques, value, word};
 use super::{Readable, Referee, Run};
 use crate::records::Trace;
+use crate::trajectory::Support;
 use ik_core::problem::Problem;
 use ik_core::robot::Root;
 use ik_core::task::{OrientationCoordinates, Track};
@@ -29,10 +31,20 @@ pub(super) fn trace(referee: &Referee, run: &Run<'_>, efforts: &StepEfforts<'_>)
     for (row, balance) in rows.iter_mut().zip(balance(referee, &readable, run.dt_s)) {
         row.extend(balance_values(&balance));
     }
-    Trace {
-        columns: columns(referee),
-        rows,
+    let mut columns = columns(referee);
+    if let Some(walk) = run.walk {
+        columns.extend(["zmp_reference_x", "zmp_reference_y"].map(str::to_owned));
+        for (k, row) in rows.iter_mut().enumerate() {
+            row.extend(walk.zmp_m.get(k).unwrap_or(&[f64::NAN; 2]));
+        }
     }
+    Trace { columns, rows }
+}
+
+/// Whether torques are those of a robot that hangs on the support of the phase.
+fn hangs(referee: &Referee) -> bool {
+    let phases = referee.problem.phases();
+    referee.spec.torque_supports.is_empty() && phases.iter().any(|phase| phase.support.is_some())
 }
 
 const BALANCE_COLUMNS: [&str; 12] = [
@@ -82,8 +94,13 @@ fn columns(referee: &Referee) -> Vec<String> {
         task_columns(problem, task, &mut columns);
     }
     columns.extend(["step_us", "majors", "minors"].map(str::to_owned));
-    if !referee.spec.torque_supports.is_empty() {
+    if !referee.spec.torque_supports.is_empty() || hangs(referee) {
         columns.extend(joints().map(|joint| format!("torque_{joint}")));
+    }
+    let objectives = problem.objectives().iter();
+    columns.extend(objectives.map(|objective| format!("objective_{}", word(objective))));
+    if hangs(referee) {
+        columns.push("standing_foot".to_owned());
     }
     if !referee.spec.soles.is_empty() {
         columns.extend(BALANCE_COLUMNS.map(str::to_owned));
@@ -162,6 +179,34 @@ fn row(
         let torques = static_torques(problem.robot(), &readable.postures[k], supports);
         row.extend(torques.unwrap_or_else(|| vec![0.0; joints]));
     }
+    row.extend(objective_values(referee, readable, k));
+    row
+}
+
+/// Torques on the support of the phase, objectives, and the foot that stands alone.
+fn objective_values(referee: &Referee, readable: &Readable<'_>, k: usize) -> Vec<f64> {
+    let problem = &*referee.problem;
+    let (hangs, objectives) = (hangs(referee), problem.objectives());
+    if !hangs && objectives.is_empty() {
+        return Vec::new();
+    }
+    let sample = &readable.samples[k];
+    let torques = support_torques(problem, sample, &readable.postures[k]);
+    let values = objectives
+        .iter()
+        .map(|objective| value(problem, objective, sample, torques.as_deref()).unwrap_or(f64::NAN));
+    let values: Vec<f64> = values.collect();
+    if !hangs {
+        return values;
+    }
+    let joints = problem.robot().coordinates().len();
+    let mut row = torques.unwrap_or_else(|| vec![f64::NAN; joints]);
+    row.extend(values);
+    row.push(match sample.support {
+        Support::Both => 0.0,
+        Support::Right => -1.0,
+        Support::Left => 1.0,
+    });
     row
 }
 

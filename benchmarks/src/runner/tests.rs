@@ -30,6 +30,9 @@ fn session() -> Session {
 fn short_case(suite: &str) -> Case {
     let mut suite = Suite::load(suite).unwrap();
     suite.scenarios[0].duration_s = 0.1;
+    if let Some(walk) = &mut suite.scenarios[0].walk {
+        walk.preview.horizon_s = 0.1;
+    }
     Case::new(&suite, 0, &Variation::default()).unwrap()
 }
 

@@ -1,6 +1,6 @@
 //! Driving a method through a motion, and timing it.
 
-use super::{Played, Timing, WHOLE};
+use super::{Played, Timing};
 use crate::statistics::StepTimes;
 use crate::suite::Case;
 use ik_core::driver::{Driver, StepInput};
@@ -30,9 +30,9 @@ pub(super) fn walk(case: &Case, driver: &mut Driver, last: usize, mut each: impl
             q_prev: &q_prev,
             v_prev: &v_prev,
             dt_s: case.dt_s,
-            phase: WHOLE,
+            phase: case.phases[k - 1],
             targets: case.samples.window(k),
-            gains: &[],
+            gains: case.gains_of(k),
         };
         let begin = Instant::now();
         let (termination, counts) = driver.step(&input, majors);

@@ -3,12 +3,15 @@
 
 use super::closure::close_loops;
 use super::problem_spec::{LimitsSpec, ProblemSpec, frame};
-use super::{Meet, ScenarioSpec, SoleSpec, StartSpec, Suite};
+use super::reach::check_footsteps;
+use super::{GainSpec, Meet, ScenarioSpec, SoleSpec, StartSpec, Suite};
 use crate::error::{InputError, finite};
-use crate::referee::{JudgeSpec, Referee, Sole};
-use crate::trajectory::{Gait, Grid, Rates, Samples, Support, Trajectory};
+use crate::referee::{JudgeSpec, Referee, Sole, WalkReference};
+use crate::trajectory::{
+    Gait, Grid, Locomotion, PreviewWalk, Rates, Samples, Support, Trajectory, WalkSpec, task_values,
+};
 use ik_core::boundary::Boundary;
-use ik_core::problem::Problem;
+use ik_core::problem::{PhaseId, Problem};
 use ik_core::robot::{Robot, Root};
 use nalgebra::UnitQuaternion;
 use std::sync::Arc;
@@ -49,6 +52,14 @@ pub struct Case {
     pub trajectory: Trajectory,
     /// Which feet carry the robot at the samples k = 0 … N: both, unless it walks.
     pub support: Vec<Support>,
+    /// Phase of each step k = 1 … N.
+    pub phases: Vec<PhaseId>,
+    /// Gains of the objectives in the steps k = 1 … N, those of one step side by side.
+    gains: Vec<f64>,
+    /// What the runs are compared with where they walk by preview control.
+    pub walk: Option<WalkReference>,
+    /// Traces keep every so many samples.
+    pub trace_every: usize,
     /// Judges the runs.
     pub referee: Referee,
     /// Remarks for the rows.
@@ -78,15 +89,25 @@ impl Case {
         let dt_s = variation.dt_s.unwrap_or(suite.dt_s);
         let grid = Grid::new(dt_s, scenario.duration_s, spec.preview_s, &place)?;
         check_polygon(&spec.boundary, dt_s, &place)?;
-        let trajectory = trajectory(suite, index, &problem, &guess, grid)?;
+        let trajectory = targets(suite, index, &problem, &guess, grid)?;
+        let gains = gains(suite, index, &problem, &trajectory, grid)?;
         let q_start = match start.meet {
-            Meet::Nothing => guess,
+            Meet::Nothing => guess.clone(),
             Meet::Targets => {
                 let met = close_loops(&spec, &trajectory, &guess, &place, &start_place)?;
                 check_limits(problem.robot(), &met, &start_place)?;
                 met
             }
         };
+        if let Some(walk) = &scenario.walk {
+            let field = format!("scenarios[{index}].walk");
+            let rebuilt = |walk: &WalkSpec| {
+                let mut suite = suite.clone();
+                suite.scenarios[index].walk = Some(walk.clone());
+                targets(&suite, index, &problem, &guess, grid)
+            };
+            check_footsteps(&spec, walk, &rebuilt, &q_start, &suite.source, &field)?;
+        }
         let samples = Samples::new(&problem, &trajectory, grid, spec.rates, &place)?;
         let referee = judge(suite, &problem)?;
         let notes = match spec.rates {
@@ -94,26 +115,114 @@ impl Case {
             other => vec![format!("target rates: {}", other.word())],
         };
         let scenario = variation.label(&scenario.id);
-        let (suite, suite_dt_s) = (suite.id.clone(), suite.dt_s);
         Ok(Self {
-            suite,
+            suite: suite.id.clone(),
             scenario,
             spec,
             problem,
             q_start,
             dt_s,
-            suite_dt_s,
+            suite_dt_s: suite.dt_s,
             samples,
             support: trajectory.support(grid),
+            phases: trajectory.phases(grid),
+            gains,
+            walk: trajectory.walk().map(|walk| reference(walk, grid)),
             trajectory,
+            trace_every: suite.trace_every,
             referee,
             notes,
         })
     }
+
+    /// Gains of the objectives in step k (from 1).
+    pub fn gains_of(&self, k: usize) -> &[f64] {
+        let count = self.problem.objectives().len();
+        &self.gains[(k - 1) * count..k * count]
+    }
+}
+
+/// What runs of a walk are compared with at the samples of a grid.
+fn reference(walk: &PreviewWalk, grid: Grid) -> WalkReference {
+    let times = || (0..=grid.steps).map(|k| grid.time(k));
+    let ends = walk.plan.cycle_ends_s();
+    // The sample nearest to each end, if the run gets there.
+    let nearest = |end: f64| times().position(|t| t >= end - 0.5 * grid.dt_s);
+    WalkReference {
+        zmp_m: times().map(|t| walk.plan.zmp_m(t)).collect(),
+        cycle_ends: ends.into_iter().filter_map(nearest).collect(),
+    }
+}
+
+/// Gains of the objectives in all steps, each that of the sample the step begins at.
+fn gains(
+    suite: &Suite,
+    index: usize,
+    problem: &Problem,
+    trajectory: &Trajectory,
+    grid: Grid,
+) -> Result<Vec<f64>, InputError> {
+    let (scenario, source) = (&suite.scenarios[index], &suite.source);
+    let (found, needed) = (scenario.gains.len(), problem.objectives().len());
+    let field = format!("scenarios[{index}].gains");
+    if found != needed {
+        let allowed = format!("{needed}, one for each objective of the problem");
+        return Err(InputError::value(
+            source,
+            &field,
+            format!("{found} gains"),
+            &allowed,
+        ));
+    }
+    for (i, gain) in scenario.gains.iter().enumerate() {
+        gain.check(trajectory, source, &format!("{field}[{i}]"))?;
+    }
+    let at = |t: f64| scenario.gains.iter().map(move |gain| gain.at(trajectory, t));
+    Ok((0..grid.steps).flat_map(|k| at(grid.time(k))).collect())
+}
+
+impl GainSpec {
+    fn check(&self, trajectory: &Trajectory, place: &str, field: &str) -> Result<(), InputError> {
+        let not_negative = |name: &str, value: f64| {
+            if value.is_finite() && value >= 0.0 {
+                return Ok(());
+            }
+            let field = format!("{field}.{name}");
+            Err(InputError::value(
+                place,
+                &field,
+                value,
+                "a finite number, not negative",
+            ))
+        };
+        not_negative("value", self.value)?;
+        let Some(ramp_s) = self.single_support_ramp_s else {
+            return Ok(());
+        };
+        not_negative("single_support_ramp_s", ramp_s)?;
+        if trajectory.walk().is_none() {
+            let field = format!("{field}.single_support_ramp_s");
+            return Err(InputError::value(
+                place,
+                &field,
+                ramp_s,
+                "nothing: the scenario has no walk",
+            ));
+        }
+        Ok(())
+    }
+
+    /// The gain at `t` (s).
+    fn at(&self, trajectory: &Trajectory, t: f64) -> f64 {
+        match (self.single_support_ramp_s, trajectory.walk()) {
+            (Some(ramp_s), Some(walk)) => self.value * walk.plan.single_support_ramp(t, ramp_s),
+            _ => self.value,
+        }
+    }
 }
 
 /// The targets of scenario `index` for a robot that starts at `guess`.
-fn trajectory(
+fn targets(
     suite: &Suite,
     index: usize,
     problem: &Problem,
@@ -122,11 +231,30 @@ fn trajectory(
 ) -> Result<Trajectory, InputError> {
     let (scenario, source) = (&suite.scenarios[index], &suite.source);
     let field = |name: &str| format!("scenarios[{index}].{name}");
-    let gait = match &scenario.gait {
-        Some(gait) => Some(Gait::new(gait, problem, source, &field("gait"))?),
-        None => None,
+    let locomotion = match (&scenario.gait, &scenario.walk) {
+        (None, None) => None,
+        (Some(gait), None) => {
+            let gait = Gait::new(gait, problem, source, &field("gait"))?;
+            Some(Locomotion::Gait(Box::new(gait)))
+        }
+        (None, Some(walk)) => {
+            let values = task_values(problem, guess);
+            let field = field("walk");
+            let walk = PreviewWalk::new(walk, problem, &values, grid, source, &field)?;
+            Some(Locomotion::Walk(Box::new(walk)))
+        }
+        (Some(_), Some(_)) => {
+            let found = "a second source of the same targets";
+            return Err(InputError::value(
+                source,
+                &field("walk"),
+                found,
+                "a gait or a walk",
+            ));
+        }
     };
-    let trajectory = Trajectory::new(problem, guess, gait, &scenario.motion, source, &field("motion"))?;
+    let motion = &scenario.motion;
+    let trajectory = Trajectory::new(problem, guess, locomotion, motion, source, &field("motion"))?;
     trajectory.check_reach(grid, source, &field("gait"))?;
     Ok(trajectory)
 }

@@ -1,4 +1,4 @@
-//! A start that closes the loops: the configuration near a guess that meets the targets of all tasks at t = 0.
+//! Closing the loops: the configuration near a guess that meets the targets of all tasks at one time, the start for one.
 //!
 //! Damped Gauss–Newton (Levenberg 1944): with error e and Jacobian J of all task rows, `dq = −Jᵀ (J Jᵀ + μ I)⁻¹ e`, the
 //! damping μ falling with every step that reduces |e| and rising with every other. Short steps keep joints on the side of
@@ -6,7 +6,7 @@
 
 use super::problem_spec::{PrioritySpec, ProblemSpec};
 use crate::error::InputError;
-use crate::trajectory::{Grid, Rates, Samples, Trajectory, row_name};
+use crate::trajectory::{Samples, Trajectory, row_name};
 use ik_core::boundary::Boundary;
 use ik_core::configuration::integrate;
 use ik_core::evaluator::{Evaluator, Linearisation};
@@ -41,22 +41,82 @@ pub(super) fn close_loops(
     place: &str,
     start: &str,
 ) -> Result<Vec<f64>, InputError> {
-    let problem = all_rows(spec).build(place)?;
-    let grid = Grid {
-        dt_s: 1.0,
-        steps: 1,
-        preview: 0,
-    };
-    let samples = Samples::new(&problem, trajectory, grid, Rates::Analytic, place)?;
-    let closure = Closure {
-        problem: &problem,
-        target: samples.window(1).previous(),
-    };
-    let (q, error) = closure.solve(guess);
-    if error.amax() <= ACCEPTED {
-        return Ok(q);
+    let closer = Closer::new(spec, place)?;
+    let closed = closer.close(trajectory, 0.0, guess, place)?;
+    match closed.miss {
+        None => Ok(closed.q),
+        Some(miss) => Err(miss.at_start(start)),
     }
-    Err(closure.missed(&error, start))
+}
+
+/// Closes loops at any time of a motion.
+#[derive(Debug)]
+pub(super) struct Closer {
+    problem: Arc<Problem>,
+}
+
+/// The best configuration found.
+#[derive(Debug)]
+pub(super) struct Closed {
+    pub(super) q: Vec<f64>,
+    /// The component that misses most, if one misses.
+    pub(super) miss: Option<Miss>,
+}
+
+/// A component that cannot be met.
+#[derive(Debug)]
+pub(super) struct Miss {
+    /// `task.component`.
+    pub(super) component: String,
+    /// By how much (m or rad).
+    pub(super) error: f64,
+}
+
+impl Miss {
+    fn at_start(&self, start: &str) -> InputError {
+        let field = format!("meet = \"targets\": {} at t = 0", self.component);
+        let found = format!("missed by {:.3e}", self.error);
+        let allowed =
+            format!("{ACCEPTED:e} (m or rad); targets that the robot can meet, or a guess nearer to them");
+        InputError::value(start, &field, found, &allowed)
+    }
+}
+
+impl Closer {
+    /// For the tasks of `spec`; `place` goes into messages.
+    ///
+    /// # Errors
+    /// As [`ProblemSpec::build`].
+    pub(super) fn new(spec: &ProblemSpec, place: &str) -> Result<Self, InputError> {
+        let problem = all_rows(spec).build(place)?;
+        Ok(Self { problem })
+    }
+
+    /// The configuration near `guess` that meets all targets at `t` (s), or the best there is.
+    ///
+    /// # Errors
+    /// A target that is not finite.
+    pub(super) fn close(
+        &self,
+        trajectory: &Trajectory,
+        t: f64,
+        guess: &[f64],
+        place: &str,
+    ) -> Result<Closed, InputError> {
+        let sample = Samples::at(&self.problem, trajectory, t, place)?;
+        let (x, xdot) = sample.split_at(self.problem.nx());
+        let closure = Closure {
+            problem: &self.problem,
+            target: Sample { x, xdot },
+        };
+        let (q, error) = closure.solve(guess);
+        let row = error.iamax();
+        let miss = (error[row].abs() > ACCEPTED).then(|| Miss {
+            component: row_name(&self.problem, row),
+            error: error[row].abs(),
+        });
+        Ok(Closed { q, miss })
+    }
 }
 
 /// The same tasks, all of them in full: hard, so that no weight hides a row.
@@ -64,6 +124,7 @@ fn all_rows(spec: &ProblemSpec) -> ProblemSpec {
     let mut spec = spec.clone();
     spec.boundary = Boundary::None;
     spec.preview_s = 0.0;
+    spec.objectives.clear();
     for task in &mut spec.tasks {
         task.priority = PrioritySpec::Hard;
     }
@@ -108,15 +169,6 @@ impl Closure<'_> {
         let (rows, cols) = (lin.hard.rows(), lin.hard.cols());
         let error = DVector::from_column_slice(&lin.hard.error[..rows]);
         (error, DMatrix::from_fn(rows, cols, |i, v| lin.hard.column(v)[i]))
-    }
-
-    fn missed(&self, error: &DVector<f64>, start: &str) -> InputError {
-        let row = error.iamax();
-        let field = format!("meet = \"targets\": {} at t = 0", row_name(self.problem, row));
-        let found = format!("missed by {:.3e}", error[row].abs());
-        let allowed =
-            format!("{ACCEPTED:e} (m or rad); targets that the robot can meet, or a guess nearer to them");
-        InputError::value(start, &field, found, &allowed)
     }
 }
 

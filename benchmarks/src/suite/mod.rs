@@ -4,6 +4,7 @@ mod case;
 mod closure;
 mod lineup;
 mod problem_spec;
+mod reach;
 
 pub use case::{Case, Variation};
 pub use lineup::{Selection, lineup};
@@ -12,7 +13,7 @@ pub use problem_spec::{LimitsSpec, PrioritySpec, ProblemSpec, RobotSpec, TaskSpe
 
 use crate::error::InputError;
 use crate::referee::Foot;
-use crate::trajectory::{GaitSpec, MotionSpec};
+use crate::trajectory::{GaitSpec, MotionSpec, WalkSpec};
 use ik_core::boundary::Boundary;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -42,6 +43,12 @@ pub struct Suite {
     /// What each foot stands on, where balance is asked for.
     #[serde(default)]
     pub soles: Vec<SoleSpec>,
+    /// Whether `ik-bench --quick` leaves it out.
+    #[serde(default)]
+    pub full_only: bool,
+    /// Traces keep every so many samples, and the last one; all without it.
+    #[serde(default = "every_sample")]
+    pub trace_every: usize,
     /// The problem of all scenarios.
     pub problem: ProblemSpec,
     /// Named start configurations.
@@ -54,6 +61,10 @@ pub struct Suite {
     /// Where it was read from, for messages.
     #[serde(skip)]
     pub source: String,
+}
+
+fn every_sample() -> usize {
+    1
 }
 
 /// What a foot stands on: a rectangle around the origin of a frame, in its x–y plane, x forwards.
@@ -115,12 +126,29 @@ pub struct ScenarioSpec {
     /// A walk: the targets of its tasks, in place of their values at the start.
     #[serde(default)]
     pub gait: Option<GaitSpec>,
+    /// A walk by preview control, likewise.
+    #[serde(default)]
+    pub walk: Option<WalkSpec>,
+    /// Gains of the problem's objectives, one each in their order.
+    #[serde(default)]
+    pub gains: Vec<GainSpec>,
     /// The terms that move the targets; tasks without one keep their value at the start.
     #[serde(default)]
     pub motion: Vec<MotionSpec>,
     /// Boundary in place of the problem's.
     #[serde(default)]
     pub boundary: Option<Boundary>,
+}
+
+/// The gain γ of a secondary objective: how fast the joints go down its gradient, `q̇₀ = −γ ∇H`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GainSpec {
+    /// Its full value (rad²/s per unit of the objective).
+    pub value: f64,
+    /// Zero in double support, rising from lift-off and falling to touchdown in this time (s); without it the gain is constant.
+    #[serde(default)]
+    pub single_support_ramp_s: Option<f64>,
 }
 
 /// A competing method, or several: lists in `set` are multiplied out.
@@ -155,6 +183,14 @@ pub const EMBEDDED: &[(&str, &str)] = &[
         include_str!("../../suites/bioloid/com-sway.toml"),
     ),
     ("bioloid/squat", include_str!("../../suites/bioloid/squat.toml")),
+    ("melson/walk", include_str!("../../suites/melson/walk.toml")),
+    (
+        "melson/long-walk",
+        include_str!("../../suites/melson/long-walk.toml"),
+    ),
+    ("walk/hubo", include_str!("../../suites/walk/hubo.toml")),
+    ("walk/bioloid", include_str!("../../suites/walk/bioloid.toml")),
+    ("walk/coman", include_str!("../../suites/walk/coman.toml")),
 ];
 
 impl Suite {
@@ -167,11 +203,7 @@ impl Suite {
             return Self::parse(text, &format!("suite {id}"), Path::new("."));
         }
         if !name.ends_with(".toml") {
-            let known = EMBEDDED
-                .iter()
-                .map(|(id, _)| *id)
-                .chain(["or the path of a .toml file"]);
-            return Err(InputError::unknown("command line", "suite", name, known));
+            return Err(unknown(name));
         }
         let text = std::fs::read_to_string(name).map_err(|e| InputError::File {
             file: name.to_owned(),
@@ -201,6 +233,9 @@ impl Suite {
         source.clone_into(&mut suite.source);
         suite.problem.robot = suite.problem.robot.inlined(folder)?;
         check_id(&suite.id, "id", source, "/")?;
+        if suite.trace_every == 0 {
+            return Err(InputError::value(source, "trace_every", 0, "at least 1"));
+        }
         if suite.scenarios.is_empty() {
             return Err(InputError::value(source, "scenarios", "empty", "at least one"));
         }
@@ -213,6 +248,20 @@ impl Suite {
         }
         Ok(suite)
     }
+}
+
+/// A name that is no suite: of a group of suites, or of nothing.
+fn unknown(name: &str) -> InputError {
+    let embedded = EMBEDDED.iter().chain(crate::limbs::EMBEDDED);
+    let ids: Vec<&str> = embedded.map(|(id, _)| *id).collect();
+    let group = format!("{}/", name.trim_end_matches('/'));
+    let of_group: Vec<&str> = ids.iter().copied().filter(|id| id.starts_with(&group)).collect();
+    if of_group.is_empty() {
+        let known = ids.into_iter().chain(["or the path of a .toml file"]);
+        return InputError::unknown("command line", "suite", name, known);
+    }
+    let allowed = format!("the suites of this group: {}", of_group.join(", "));
+    InputError::value("command line", "suite", name, &allowed)
 }
 
 /// Ids become names of files.

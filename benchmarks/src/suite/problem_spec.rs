@@ -6,6 +6,7 @@
 use crate::error::InputError;
 use crate::trajectory::Rates;
 use ik_core::boundary::Boundary;
+use ik_core::objective::Objective;
 use ik_core::problem::{Kind, Phase, Problem, ProblemParts, Supplies};
 use ik_core::robot::{FrameId, Limits, Robot, Root, UrdfOptions, embedded};
 use ik_core::task::{OrientationCoordinates, Priority, Task, Track, Weights};
@@ -13,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
 
-/// A problem of one phase.
+/// A problem: one phase, or one for each support. All phases have the same tasks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProblemSpec {
@@ -33,6 +34,13 @@ pub struct ProblemSpec {
     /// Seconds of future targets that methods may see.
     #[serde(default)]
     pub preview_s: f64,
+    /// Frames that the robot hangs on in turn, one phase each, in this order; without them there is one phase without a
+    /// support.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub supports: Vec<String>,
+    /// Secondary objectives; their gains stand in the scenarios.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub objectives: Vec<Objective>,
     /// What is tracked, in the order of targets and rows.
     pub tasks: Vec<TaskSpec>,
 }
@@ -140,6 +148,15 @@ impl RobotSpec {
         })
     }
 
+    /// The robot as `--robot` takes it.
+    pub(crate) fn argument(&self) -> &str {
+        match self {
+            Self::Embedded(id) => id,
+            Self::UrdfFile { path, .. } => path,
+            Self::Urdf { name, .. } => name,
+        }
+    }
+
     /// Builds the robot; `place` goes into messages.
     ///
     /// # Errors
@@ -172,26 +189,21 @@ impl ProblemSpec {
         for limits in &self.limits {
             robot = limits.apply(robot, place)?;
         }
-        let mut phase = Phase {
-            name: "whole".to_owned(),
-            support: None,
-            tasks: Vec::new(),
-        };
-        let mut tasks = Vec::new();
+        let (mut tasks, mut priorities) = (Vec::new(), Vec::new());
         for (i, spec) in self.tasks.iter().enumerate() {
             let place = format!("{place}: tasks[{i}]");
             tasks.push(Task {
                 name: checked_name(&spec.name, &place)?,
                 track: spec.track.build(&robot, &place)?,
             });
-            phase.tasks.push((i, spec.priority.build()));
+            priorities.push((i, spec.priority.build()));
         }
         let parts = ProblemParts {
+            phases: self.phases(&robot, &priorities, place)?,
             robot: Arc::new(robot),
             tasks,
-            phases: vec![phase],
             boundary: self.boundary,
-            objectives: Vec::new(),
+            objectives: self.objectives.clone(),
             kind: Kind::Tracking,
             supplies: Supplies {
                 rates: self.rates != Rates::Zero,
@@ -204,6 +216,26 @@ impl ProblemSpec {
             place: place.to_owned(),
             source,
         })
+    }
+
+    /// One phase per support, named after its frame, all with the same tasks.
+    fn phases(
+        &self,
+        robot: &Robot,
+        priorities: &[(usize, Priority)],
+        place: &str,
+    ) -> Result<Vec<Phase>, InputError> {
+        let phase = |name: &str, support| Phase {
+            name: name.to_owned(),
+            support,
+            tasks: priorities.to_vec(),
+        };
+        if self.supports.is_empty() {
+            return Ok(vec![phase("whole", None)]);
+        }
+        let place = format!("{place}: supports");
+        let hung = |name: &String| Ok(phase(name, Some(frame(robot, name, &place)?)));
+        self.supports.iter().map(hung).collect()
     }
 }
 

@@ -21,7 +21,7 @@ pub fn replace_readme_table(readme: &Path, rows: &[Row]) -> Result<(), RecordErr
 }
 
 /// The tables of the README, one line per method and budget: the Coman suites, then the Bioloid suites beside the plain
-/// squat, if there are rows of them.
+/// squat and the walks by preview control, if there are rows of them.
 pub fn readme_table(rows: &[Row]) -> String {
     let runs = labelled(rows);
     let table = |suites: &[&str], cells: fn(&[&Labelled<'_>]) -> Vec<String>| {
@@ -34,6 +34,9 @@ pub fn readme_table(rows: &[Row]) -> String {
     let mut text = origin(rows) + "\n" + &markdown(&HEADER, &table(&TRACKED, cells));
     if runs.iter().any(|r| r.row.suite == BIOLOID[0]) {
         text += &format!("\n{}", markdown(&BIOLOID_HEADER, &table(&BIOLOID, bioloid_cells)));
+    }
+    if runs.iter().any(|r| r.row.suite == WALKS[0]) {
+        text += &format!("\n{}", markdown(&WALK_HEADER, &table(&WALKS, walk_cells)));
     }
     text
 }
@@ -65,6 +68,24 @@ const BIOLOID_HEADER: [&str; 11] = [
     "gait: median step (µs)",
     "×ik1",
 ];
+
+const WALK_HEADER: [&str; 12] = [
+    "method",
+    "n",
+    "Melson S1, S2: mean H_joint",
+    "Melson S1, S3: Στ² (N²m²)",
+    "30 steps S1: drift (rad/cycle)",
+    "30 steps S2: drift at the end (rad/cycle)",
+    "Melson S3: hard max (mm)",
+    "Hubo walk: hard max (mm)",
+    "Bioloid walk: soft rms (mm)",
+    "Bioloid walk: ZMP error rms (mm)",
+    "Melson S3: median step (µs)",
+    "×ik1",
+];
+
+/// Suites of the third table.
+const WALKS: [&str; 4] = ["melson/walk", "melson/long-walk", "walk/hubo", "walk/bioloid"];
 
 /// Suites of the second table.
 const BIOLOID: [&str; 4] = ["bioloid/gait", "bioloid/com-sway", "bioloid/squat", "coman/squat"];
@@ -104,6 +125,31 @@ fn bioloid_cells(group: &[&Labelled<'_>]) -> Vec<String> {
         soft_rms(&of(3, "A")),
         number(gait.as_ref().map(|m| m.effort.step_us_median)),
         gait.as_ref().map_or(NONE.to_owned(), |m| ratio(&m.effort)),
+    ]
+}
+
+/// The line of one method over the walks by preview control.
+fn walk_cells(group: &[&Labelled<'_>]) -> Vec<String> {
+    let of = |suite: usize, scenario: &str| metrics(run_of(group, WALKS[suite], scenario));
+    let [nothing, centring, both] = ["S1", "S2", "S3"].map(|scenario| of(0, scenario));
+    let (hubo, bioloid) = (of(2, "walk"), of(3, "walk"));
+    let value = |m: &Option<Metrics>, v: fn(&Metrics) -> Option<f64>| number(m.as_ref().and_then(v));
+    let centred = |m| value(m, |m| m.quality.objective_mean.get("joint-centring").copied());
+    let torque = |m| value(m, |m| m.quality.single_support_torque_squared_mean_n2m2);
+    let hard = |m| millimetres(m, |m| Some(m.quality.hard_error_max_m));
+    vec![
+        group[0].label.clone(),
+        group[0].n.map_or(NONE.to_owned(), |n| n.to_string()),
+        format!("{}, {}", centred(&nothing), centred(&centring)),
+        format!("{}, {}", torque(&nothing), torque(&both)),
+        value(&of(1, "S1"), |m| m.quality.joint_drift_mean_rad_per_cycle),
+        value(&of(1, "S2"), |m| m.quality.joint_drift_last_rad_per_cycle),
+        hard(&both),
+        hard(&hubo),
+        soft_rms(&bioloid),
+        millimetres(&bioloid, |m| m.quality.zmp_reference_error_rms_m),
+        number(both.as_ref().map(|m| m.effort.step_us_median)),
+        both.as_ref().map_or(NONE.to_owned(), |m| ratio(&m.effort)),
     ]
 }
 

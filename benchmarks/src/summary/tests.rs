@@ -101,8 +101,32 @@ fn the_summary_has_a_table_and_the_analysis_per_suite() {
         "{text}"
     );
     let columns = |line: &str| line.matches('|').count();
-    let tables = text.lines().filter(|l| l.starts_with('|'));
-    assert!(tables.clone().all(|l| columns(l) == HEADER.len() + 1), "{text}");
+    let mut tables = text.lines().filter(|l| l.starts_with('|'));
+    assert!(tables.all(|l| columns(l) == HEADER.len() + 1), "{text}");
+}
+
+#[test]
+fn a_suite_that_walks_has_a_second_table_and_a_line_in_the_readme() {
+    let mut walked = row("clik", None, "melson/walk", "S1");
+    let quality = quality_of(&mut walked);
+    quality.objective_mean.insert("joint-centring".to_owned(), 0.22);
+    quality.single_support_torque_squared_mean_n2m2 = Some(2.75);
+    quality.settled_zmp_margin_min_m = Some(0.0295);
+    let rows = [row("clik", None, "coman/squat", "A"), walked, declined()];
+    let text = summary_markdown(&rows, &BTreeMap::new());
+    let second = "| S1 | clik | – | 0.220 | – | 2.75 | – | – | – | – | 29.5 | – |";
+    assert_eq!(text.matches("mean H_joint").count(), 1, "{text}");
+    assert!(
+        text.contains(second) && text.contains("drift: largest change"),
+        "{text}"
+    );
+    assert!(!summary_markdown(&rows[..1], &BTreeMap::new()).contains("drift"));
+    let readme = readme_table(&rows);
+    assert!(
+        readme.contains("| clik | – | 0.220, – | 2.75, – | – |"),
+        "{readme}"
+    );
+    assert!(!readme_table(&rows[..1]).contains("H_joint"));
 }
 
 /// Rows recorded before there were maxima per task have the centre of mass in their place.
@@ -136,7 +160,7 @@ fn published(folder: &str) -> Vec<Row> {
 
 #[test]
 fn the_published_rows_give_the_tables_of_the_readme() {
-    let rows = published("2026-11-22-bioloid");
+    let rows = published("2026-11-22-walks");
     let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md");
     let readme = std::fs::read_to_string(readme).unwrap();
     assert!(readme.contains(&readme_table(&rows)), "{}", readme_table(&rows));

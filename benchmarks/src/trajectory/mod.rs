@@ -2,6 +2,7 @@
 //! the control grid.
 
 mod gait;
+mod preview_walk;
 mod samples;
 mod shape;
 mod spline;
@@ -10,9 +11,12 @@ mod targets;
 mod tests;
 
 pub use gait::{Gait, GaitSpec, GaitTasks, HeightKnot, Support, Swing, Walk};
+pub use preview_walk::{
+    CartTable, NoGains, Plan, PreviewControl, PreviewSpec, PreviewWalk, Step, WalkSpec, WalkTasks,
+};
 pub use samples::{Grid, Rates, Samples};
 pub use shape::Shape;
 pub use spline::{CubicSpline, Curve, KnotError};
-pub use targets::{MotionSpec, Trajectory};
+pub use targets::{Locomotion, MotionSpec, Trajectory};
 
 pub(crate) use targets::{row_name, task_values};

@@ -150,6 +150,26 @@ impl Samples {
         })
     }
 
+    /// The one sample `[x | ẋ]` at `t` (s), with exact rates.
+    ///
+    /// # Errors
+    /// As [`Samples::new`].
+    pub(crate) fn at(
+        problem: &Problem,
+        trajectory: &Trajectory,
+        t: f64,
+        place: &str,
+    ) -> Result<Vec<f64>, InputError> {
+        let (mut value, mut rate) = (vec![0.0; problem.nxdot()], vec![0.0; problem.nxdot()]);
+        trajectory.value_into(t, &mut value);
+        trajectory.rate_into(t, &mut rate);
+        check_finite(problem, t, &value, &rate, place)?;
+        let mut sample = vec![0.0; problem.nx() + problem.nxdot()];
+        let (x, xdot) = sample.split_at_mut(problem.nx());
+        encode(problem, &value, &rate, x, xdot);
+        Ok(sample)
+    }
+
     /// N, the number of control steps.
     pub fn steps(&self) -> usize {
         self.steps

@@ -123,12 +123,12 @@ impl Shape {
 }
 
 /// `10u³ − 15u⁴ + 6u⁵`, 0 before and 1 after.
-fn smooth_step(u: f64) -> f64 {
+pub(super) fn smooth_step(u: f64) -> f64 {
     let u = u.clamp(0.0, 1.0);
     u * u * u * (10.0 + u * (-15.0 + u * 6.0))
 }
 
-fn smooth_step_slope(u: f64) -> f64 {
+pub(super) fn smooth_step_slope(u: f64) -> f64 {
     let u = u.clamp(0.0, 1.0);
     30.0 * u * u * (1.0 - u) * (1.0 - u)
 }

@@ -5,11 +5,12 @@
 //! a trajectory is sampled.
 
 use super::gait::{Gait, Support};
+use super::preview_walk::PreviewWalk;
 use super::samples::Grid;
 use super::shape::Shape;
 use crate::error::{InputError, finite};
 use ik_core::kinematics::{Page, forward};
-use ik_core::problem::Problem;
+use ik_core::problem::{PhaseId, Problem};
 use ik_core::robot::{FrameId, Robot};
 use ik_core::spatial::rpy;
 use ik_core::task::Track;
@@ -45,12 +46,51 @@ struct Term {
 #[derive(Clone, Debug)]
 pub struct Trajectory {
     base: Vec<f64>,
-    pub(super) gait: Option<Gait>,
+    pub(super) locomotion: Option<Locomotion>,
     terms: Vec<Term>,
 }
 
+/// What makes the feet go, where they do: a source of all rows of several tasks.
+#[derive(Clone, Debug)]
+pub enum Locomotion {
+    /// Splines through knots.
+    Gait(Box<Gait>),
+    /// Footsteps and preview control.
+    Walk(Box<PreviewWalk>),
+}
+
+impl Locomotion {
+    fn moves(&self, row: usize) -> bool {
+        match self {
+            Self::Gait(gait) => gait.moves(row),
+            Self::Walk(walk) => walk.moves(row),
+        }
+    }
+
+    fn support(&self, t: f64) -> Support {
+        match self {
+            Self::Gait(gait) => gait.support(t),
+            Self::Walk(walk) => walk.support(t),
+        }
+    }
+
+    fn value_into(&self, t: f64, out: &mut [f64]) {
+        match self {
+            Self::Gait(gait) => gait.value_into(t, out),
+            Self::Walk(walk) => walk.value_into(t, out),
+        }
+    }
+
+    fn rate_into(&self, t: f64, out: &mut [f64]) {
+        match self {
+            Self::Gait(gait) => gait.rate_into(t, out),
+            Self::Walk(walk) => walk.rate_into(t, out),
+        }
+    }
+}
+
 impl Trajectory {
-    /// The motion of a robot that starts at `q_start` (length nq): the walk, elsewhere the values at the start, and the
+    /// The motion of a robot that starts at `q_start` (length nq): gait or walk, elsewhere the values at the start, and the
     /// terms on top of both. `place` and `field` (the path of the list of terms) go into messages.
     ///
     /// # Errors
@@ -58,7 +98,7 @@ impl Trajectory {
     pub fn new(
         problem: &Problem,
         q_start: &[f64],
-        gait: Option<Gait>,
+        locomotion: Option<Locomotion>,
         motion: &[MotionSpec],
         place: &str,
         field: &str,
@@ -72,8 +112,8 @@ impl Trajectory {
                 terms.push(term);
                 continue;
             };
-            if gait.as_ref().is_some_and(|gait| gait.moves(term.row)) {
-                let found = "a hold on what the gait moves";
+            if locomotion.as_ref().is_some_and(|walk| walk.moves(term.row)) {
+                let found = "a hold on what the gait or walk moves";
                 return Err(InputError::value(place, &field, found, "any other shape"));
             }
             if held.contains(&term.row) {
@@ -87,21 +127,46 @@ impl Trajectory {
             held.push(term.row);
             base[term.row] = value;
         }
-        Ok(Self { base, gait, terms })
+        Ok(Self {
+            base,
+            locomotion,
+            terms,
+        })
     }
 
-    /// The walk in it.
+    /// The gait in it.
     pub fn gait(&self) -> Option<&Gait> {
-        self.gait.as_ref()
+        match &self.locomotion {
+            Some(Locomotion::Gait(gait)) => Some(gait),
+            _ => None,
+        }
+    }
+
+    /// The walk by preview control in it.
+    pub fn walk(&self) -> Option<&PreviewWalk> {
+        match &self.locomotion {
+            Some(Locomotion::Walk(walk)) => Some(walk),
+            _ => None,
+        }
     }
 
     /// Which feet carry the robot at the samples k = 0 … N: both without a walk.
     pub fn support(&self, grid: Grid) -> Vec<Support> {
-        let at = |k| match &self.gait {
-            Some(gait) => gait.support(grid.time(k)),
+        let at = |k| match &self.locomotion {
+            Some(walk) => walk.support(grid.time(k)),
             None => Support::Both,
         };
         (0..=grid.steps).map(at).collect()
+    }
+
+    /// The phase of each step k = 1 … N: the step from k − 1 to k is made in the phase of its beginning, so that a robot hangs
+    /// on one foot from the first sample of a step to the last.
+    pub fn phases(&self, grid: Grid) -> Vec<PhaseId> {
+        let at = |k| match self.walk() {
+            Some(walk) => walk.phase(grid.time(k)),
+            None => PhaseId(0),
+        };
+        (0..grid.steps).map(at).collect()
     }
 
     /// Checks that every limb of the walk reaches its targets at all samples; `place` and `field` (the path of the walk)
@@ -110,7 +175,7 @@ impl Trajectory {
     /// # Errors
     /// The limb and the time that miss most, by how much, and what to change.
     pub fn check_reach(&self, grid: Grid, place: &str, field: &str) -> Result<(), InputError> {
-        let Some(gait) = &self.gait else {
+        let Some(gait) = self.gait() else {
             return Ok(());
         };
         let times = (0..=grid.steps + grid.preview).map(|k| grid.time(k));
@@ -125,8 +190,8 @@ impl Trajectory {
     /// Writes the values at `t` (s), one per task row (m, or rad with orientations as roll, pitch, yaw).
     pub fn value_into(&self, t: f64, out: &mut [f64]) {
         out.copy_from_slice(&self.base);
-        if let Some(gait) = &self.gait {
-            gait.value_into(t, out);
+        if let Some(walk) = &self.locomotion {
+            walk.value_into(t, out);
         }
         for term in self.active(t) {
             out[term.row] += term.shape.value(t - term.from_s);
@@ -136,8 +201,8 @@ impl Trajectory {
     /// Writes the exact time derivatives of the values at `t` (s).
     pub fn rate_into(&self, t: f64, out: &mut [f64]) {
         out.fill(0.0);
-        if let Some(gait) = &self.gait {
-            gait.rate_into(t, out);
+        if let Some(walk) = &self.locomotion {
+            walk.rate_into(t, out);
         }
         for term in self.active(t) {
             out[term.row] += term.shape.rate(t - term.from_s);

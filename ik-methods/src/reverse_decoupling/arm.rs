@@ -51,6 +51,8 @@ impl ArmBranch {
 /// An elbow whose sine is below this is straight or folded. The sine of a stretched elbow is the root of what rounding
 /// leaves of the pose, some 1e-7; snapping it costs the sine times the upper arm.
 const STRAIGHT_ELBOW: f64 = 5e-7;
+/// What rounding of the pose leaves of the sine of a stretched elbow.
+const STRETCHED_SLACK: f64 = 1e-7;
 /// A wrist whose cosine (times the sine of the elbow) is below this is at its double root: the same argument.
 const DOUBLE_WRIST: f64 = 1e-7;
 /// A shoulder this near the last axis, as part of the stretched arm, leaves θ6 free.
@@ -176,13 +178,13 @@ impl Arm {
         let hinge = hinge(l2, l3, across.hypot(z))?;
         // |p'z| = l2 |S4 S5|: the last axis fixes the plane of the forearm.
         let out_of_plane = l2 * hinge.sine;
-        if z.abs() > out_of_plane + REACH_TOLERANCE_M && hinge.sine > STRAIGHT_ELBOW {
-            return Err(Unsolved::Orientation {
-                found_m: z.abs(),
-                largest_m: out_of_plane,
-            });
-        }
-        if hinge.sine <= STRAIGHT_ELBOW && z.abs() > out_of_plane + l2 * STRAIGHT_ELBOW {
+        // Near a stretched elbow the sine is off by the root of rounding.
+        let slack = if hinge.sine > STRAIGHT_ELBOW {
+            REACH_TOLERANCE_M
+        } else {
+            l2 * STRETCHED_SLACK
+        };
+        if z.abs() > out_of_plane + slack {
             return Err(Unsolved::Orientation {
                 found_m: z.abs(),
                 largest_m: out_of_plane,

@@ -113,8 +113,8 @@ impl Formulation for ReverseDecoupling {
             majors: if iterates { self.parameters.n } else { 1 },
             honours: Honours {
                 boundary: true,
-                // The waist gives way to limits by a local search, which may miss a place where all limbs reach.
-                hard_rows: !iterates,
+                // Of several joints that a singularity leaves free one gives way to limits, and the waist by a local search.
+                hard_rows: false,
                 objective: Use::Ignored,
                 allocation_free: true,
                 counts: Trust::Metered,
@@ -140,14 +140,18 @@ impl Stepper for ReverseDecouplingStepper {
         if !step.targets.now().x.iter().all(|x| x.is_finite()) {
             return Termination::Numerical("a target is not finite");
         }
+        let plan = &self.plans[step.phase.0];
+        if !plan.has_rotations(step.targets.now().x) {
+            return Termination::Numerical("an orientation target is no rotation");
+        }
         let robot = self.problem.robot();
-        let one = Step::new(robot, &self.plans[step.phase.0], step);
+        let one = Step::new(robot, plan, step);
         let termination = one.solve(&mut self.work, eval);
         let best = &self.work.best;
-        if best.merit.missing_m > 0.0 {
-            return termination;
+        // Without a configuration the robot stays, but for what the intervals force.
+        if best.merit.missing_m == 0.0 {
+            out.q.copy_from_slice(&best.q);
         }
-        out.q.copy_from_slice(&best.q);
         let first = robot.root();
         for (i, q) in out.q[first.nq()..].iter_mut().enumerate() {
             let v = first.nv() + i;

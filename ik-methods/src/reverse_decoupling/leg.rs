@@ -191,7 +191,8 @@ impl Leg {
             k,
             psi: (knee.sine * l3).atan2(knee.cosine * l3 + l4),
             knee,
-            free: d3 == 0.0 && across < near,
+            // An offset smaller than that is none: the products with it would vanish on the axis.
+            free: across < near,
             // Equal links folded up: the hip is on the ankle's own axis, and thigh and shank turn about it together.
             folded: k.hypot(p.z) < near,
         })

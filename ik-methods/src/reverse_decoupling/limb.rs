@@ -128,7 +128,7 @@ impl Limb {
         self.joints
     }
 
-    /// Calls `found` with the joint values (rad, base to tip, each in (−π, π]) of every solution and its branch number, for
+    /// Calls `found` with the joint values (rad, base to tip, each in [−π, π]) of every solution and its branch number, for
     /// a pose of the tip body in the base body; returns how many there are. Joints that the geometry leaves free stay at
     /// `previous` (one value per joint). Limits are the caller's affair. Solutions of the general family are numbered
     /// through.

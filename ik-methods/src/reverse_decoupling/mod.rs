@@ -115,7 +115,7 @@ impl<const JOINTS: usize> Default for Solutions<JOINTS> {
 const SAME_RAD: f64 = 1e-6;
 
 impl<const JOINTS: usize> Solutions<JOINTS> {
-    /// The solutions, in the order of branches: joints in (−π, π], branch number.
+    /// The solutions, in the order of branches: joints in [−π, π], branch number.
     pub fn iter(&self) -> impl Iterator<Item = (&[f64; JOINTS], u8)> {
         self.joints[..self.count].iter().zip(self.branches)
     }

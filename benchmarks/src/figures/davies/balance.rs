@@ -2,26 +2,22 @@
 
 use super::super::axis::Axis;
 use super::super::figure::{Figure, PanelRow};
-use super::super::panel::{Band, Curve, Level, Markers, Panel, time_axis};
-use super::super::style::{BLACK, BLUE, Dash, Marker, PALE_GREEN, Style, VERMILLION};
-use super::super::{Obstacle, Points, Studio, over_time, place_of};
-use super::{Walked, walked};
-
-const fn style(colour: plotters::style::RGBColor, dash: Dash) -> Style {
-    let marker = Marker::Circle;
-    Style { colour, dash, marker }
-}
+use super::super::panel::{Band, Level, Panel, time_axis};
+use super::super::style::{BLACK, BLUE, Dash, PALE_GREEN, Style, VERMILLION};
+use super::super::walked::{Walked, line, plain, walked};
+use super::super::{Obstacle, Studio, over_time, place_of};
+use super::PLACE;
 
 /// Column prefix, name, style and width, from the undermost to the topmost.
 const POINTS: [(&str, &str, Style, f64); 3] = [
-    ("zmp", "ZMP of point masses", style(VERMILLION, Dash::Solid), 1.3),
-    ("cart_zmp", "ZMP of the cart", style(BLUE, Dash::Long), 1.3),
-    ("gcom", "GCoM", style(BLACK, Dash::Solid), 2.0),
+    ("zmp", "ZMP of point masses", plain(VERMILLION, Dash::Solid), 1.3),
+    ("cart_zmp", "ZMP of the cart", plain(BLUE, Dash::Long), 1.3),
+    ("gcom", "GCoM", plain(BLACK, Dash::Solid), 2.0),
 ];
 
 /// Figures 11 and 12.
 pub(in super::super) fn balance(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
-    let walked = walked(studio)?;
+    let walked = walked(studio, PLACE)?;
     if walked.trace.column("gcom_x").is_none() {
         return Err(Obstacle::NoData("the trace has no balance columns".to_owned()));
     }
@@ -30,7 +26,7 @@ pub(in super::super) fn balance(studio: &mut Studio<'_>) -> Result<String, Obsta
         let points = walked.difference(&format!("zmp_{axis}"), &format!("gcom_{axis}"));
         let name = format!("ZMP of point masses less GCoM, {axis}");
         away.curves
-            .extend(points.map(|p| line(&name, p, style(colour, dash), 1.5)));
+            .extend(points.map(|p| line(&name, p, plain(colour, dash), 1.5)));
     }
     away.bands = walked.supports();
     let mut margin = Panel::new("", time_axis(), Axis::linear("margin to the border (m)"));
@@ -77,14 +73,4 @@ fn extent(title: &str, axis: &str, walked: &Walked<'_>) -> Panel {
         panel.curves.extend(points.map(|p| line(name, p, style, width)));
     }
     panel
-}
-
-fn line(name: &str, points: Points, style: Style, width: f64) -> Curve {
-    Curve {
-        name: name.to_owned(),
-        points,
-        style,
-        width,
-        markers: Markers::None,
-    }
 }

@@ -5,20 +5,21 @@ use super::super::figure::{Figure, PanelRow};
 use super::super::panel::{Curve, Markers, Panel, time_axis};
 use super::super::style::{BLUE, Dash, Marker, Style, Styles, VERMILLION};
 use super::super::tracking::method_curve;
-use super::super::{Obstacle, Points, Studio, Traced, place_of};
-use super::{METHOD, SCENARIO, SUITE, walked};
-use crate::records::Trace;
+use super::super::walked::walked;
+use super::super::{Obstacle, Points, Studio, Traced, largest_over_time, place_of};
+use super::PLACE;
 use ik_core::problem::PhaseId;
 use ik_methods::davies::{Network, OrientationRates, ReferencePoint};
 
 /// Closure error of every setting of the method that was run.
 pub(in super::super) fn closure(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
-    let mut runs = studio.runs_of(SUITE, SCENARIO);
-    runs.retain(|run| run.row.method.starts_with(METHOD));
+    let mut runs = studio.runs_of(PLACE.suite, PLACE.scenario);
+    runs.retain(|run| run.row.method.starts_with(PLACE.method));
     let traced = studio.with_traces(runs)?;
     let Some(first) = traced.first() else {
         return Err(Obstacle::NoData(format!(
-            "no run of {METHOD} with a trace on {SUITE}/{SCENARIO}"
+            "no run of {} with a trace on {}/{}",
+            PLACE.method, PLACE.suite, PLACE.scenario
         )));
     };
     let panels = [
@@ -38,7 +39,7 @@ pub(in super::super) fn closure(studio: &mut Studio<'_>) -> Result<String, Obsta
 fn panel(label: &str, suffix: &str, traced: &[Traced<'_>], styles: &Styles) -> Panel {
     let mut panel = Panel::new("", time_axis(), Axis::log(label));
     for (rank, one) in traced.iter().enumerate() {
-        let points = largest(&one.trace, suffix);
+        let points = largest_over_time(&one.trace, suffix);
         panel
             .curves
             .extend(points.map(|p| method_curve(&one.run, p, rank, styles)));
@@ -46,21 +47,12 @@ fn panel(label: &str, suffix: &str, traced: &[Traced<'_>], styles: &Styles) -> P
     panel
 }
 
-/// Points (t, largest value of all columns that end so).
-fn largest(trace: &Trace, suffix: &str) -> Option<Points> {
-    let t = trace.column("t")?;
-    let ends = |i: &usize| trace.columns[*i].ends_with(suffix);
-    let columns: Vec<usize> = (0..trace.columns.len()).filter(ends).collect();
-    let of_row = |row: &Vec<f64>| columns.iter().map(|i| row[*i]).fold(f64::NAN, f64::max);
-    Some(t.into_iter().zip(trace.rows.iter().map(of_row)).collect())
-}
-
 /// Condition numbers are computed at about this many samples.
 const SAMPLES: usize = 400;
 
 /// Condition number of N_s with rows at the task points and at the origin.
 pub(in super::super) fn condition(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
-    let walked = walked(studio)?;
+    let walked = walked(studio, PLACE)?;
     let problem = &walked.case.problem;
     let stride = walked.q.len().div_ceil(SAMPLES);
     let points = |reference: ReferencePoint| -> Points {
@@ -110,20 +102,4 @@ pub(in super::super) fn condition(studio: &mut Studio<'_>) -> Result<String, Obs
     Ok(Figure::new(title, vec![PanelRow::new(380.0, vec![panel])])
         .with_remarks(vec![remark.to_owned()])
         .render()?)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_largest_of_all_tasks_counts_and_rates_do_not() {
-        let columns = ["t", "a_error_m", "b_error_m", "a_error_rad", "com_rate_error_m_s"];
-        let trace = Trace {
-            columns: columns.map(str::to_owned).to_vec(),
-            rows: vec![vec![0.0, 1.0, 2.0, 3.0, 9.0], vec![0.5, 5.0, 4.0, 3.5, 9.0]],
-        };
-        assert_eq!(largest(&trace, "_error_m"), Some(vec![(0.0, 2.0), (0.5, 5.0)]));
-        assert_eq!(largest(&trace, "_error_rad"), Some(vec![(0.0, 3.0), (0.5, 3.5)]));
-    }
 }

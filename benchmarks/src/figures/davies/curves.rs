@@ -6,8 +6,9 @@ use super::super::panel::{Curve, Dot, Markers, Panel, time_axis};
 use super::super::sheet::{Key, Shows};
 use super::super::style::{BLACK, Dash, LEFT, Marker, RIGHT, Style, TRUNK};
 use super::super::tracking::reference_curve;
+use super::super::walked::{Walked, walked};
 use super::super::{Obstacle, Points, Studio, over_time, place_of};
-use super::{Walked, walked};
+use super::PLACE;
 use crate::trajectory;
 
 const KNOT: Style = Style {
@@ -21,7 +22,7 @@ const LEAST_SPAN_RAD: f64 = 0.2;
 
 /// Figures 6 and 7, and how far the feet miss.
 pub(in super::super) fn feet(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
-    let walked = walked(studio)?;
+    let walked = walked(studio, PLACE)?;
     let walk = &gait(&walked)?.walk;
     let feet = [
         ("right-foot", RIGHT, &walk.right_foot),
@@ -45,7 +46,7 @@ pub(in super::super) fn feet(studio: &mut Studio<'_>) -> Result<String, Obstacle
 
 /// Figures 8 and 9, and the hands.
 pub(in super::super) fn waist(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
-    let walked = walked(studio)?;
+    let walked = walked(studio, PLACE)?;
     let walk = &gait(&walked)?.walk;
     let mut waist_x = Panel::new("Fig. 8", time_axis(), Axis::linear("waist x (m)"));
     let mut waist_y = Panel::new("Fig. 9", time_axis(), Axis::linear("waist y (m)"));
@@ -86,7 +87,7 @@ pub(in super::super) fn waist(studio: &mut Studio<'_>) -> Result<String, Obstacl
 
 /// Figure 13.
 pub(in super::super) fn joints(studio: &mut Studio<'_>) -> Result<String, Obstacle> {
-    let walked = walked(studio)?;
+    let walked = walked(studio, PLACE)?;
     let [right, left] = ["r_foot", "l_foot"].map(|foot| leg(&walked, foot));
     let panels = right.iter().zip(&left).map(|(right, left)| {
         let title = right.trim_start_matches("r_").replace('_', " ");

@@ -1,57 +1,31 @@
 #![allow(clippy::unwrap_used, reason = "tests want to stop at the first surprise")]
 
-use super::super::synthetic::{folder, row};
+use super::super::labels::Labelled;
+use super::super::synthetic::{folder, row, run_into};
+use super::super::walked::{Walked, walk_case};
 use super::super::{Drawn, DrawnLimits, FIGURES, draw_all};
 use super::*;
-use crate::machine::machine;
+use crate::records::{Row, Trace};
 use crate::records_io::{RowStore, write_trace};
-use crate::runner::{Session, Timing, run_case};
-use crate::suite::{Selection, lineup};
 use std::path::Path;
+
+/// Methods and time step of the runs (s).
+const DAVIES: (&[&str], f64) = (&["davies", "davies-open"], 0.04);
 
 /// Walks and squats of Davies' method, at a coarse time step.
 pub(in super::super) fn write_walk(dir: &Path) {
-    run_into(dir, SUITE, &[SCENARIO], "integrator = [\"euler\", \"rk4\"]");
-    run_into(dir, "bioloid/squat", &["z180", "z190"], "damping = [0.0, 0.01]");
-}
-
-fn run_into(dir: &Path, suite: &str, scenarios: &[&str], set: &str) {
-    let suite = Suite::load(suite).unwrap();
-    let selection = Selection {
-        methods: vec!["davies".to_owned(), "davies-open".to_owned()],
-        set: toml::from_str(set).unwrap(),
-    };
-    let contestants = lineup(&suite, &selection).unwrap();
-    let session = Session {
-        revision: "0123abc".to_owned(),
-        machine: machine(),
-        timing: Timing::QUICK,
-        notes: Vec::new(),
-    };
-    let variation = Variation {
-        dt_s: Some(0.04),
-        ..Variation::default()
-    };
-    let mut store = RowStore::open(dir).unwrap();
-    for index in 0..suite.scenarios.len() {
-        let id = &suite.scenarios[index].id;
-        if !scenarios.contains(&id.as_str()) {
-            continue;
-        }
-        let case = Case::new(&suite, index, &variation).unwrap();
-        for (i, finished) in run_case(&case, &contestants, &session, &|_| {})
-            .into_iter()
-            .enumerate()
-        {
-            let name = format!("traces/{}-{id}-{i}.csv", suite.id.replace('/', "-"));
-            write_trace(&dir.join(&name), &finished.trace(&case).unwrap()).unwrap();
-            let row = Row {
-                trace: Some(name),
-                ..finished.row
-            };
-            store.push(row).unwrap();
-        }
-    }
+    run_into(
+        dir,
+        (PLACE.suite, &[PLACE.scenario]),
+        DAVIES,
+        "integrator = [\"euler\", \"rk4\"]",
+    );
+    run_into(
+        dir,
+        ("bioloid/squat", &["z180", "z190"]),
+        DAVIES,
+        "damping = [0.0, 0.01]",
+    );
 }
 
 fn drawn(dir: &Path) -> Drawn {
@@ -148,7 +122,12 @@ fn a_walk_gives_every_figure_and_the_same_bytes_again() {
 #[test]
 fn every_knot_of_the_feet_is_marked() {
     let dir = folder("knots");
-    run_into(&dir, SUITE, &[SCENARIO], "integrator = \"euler\"");
+    run_into(
+        &dir,
+        (PLACE.suite, &[PLACE.scenario]),
+        DAVIES,
+        "integrator = \"euler\"",
+    );
     drawn(&dir);
     // Four swings with three knots in x and seven in z, and the legend; a ring is two circles.
     let circles = figure(&dir, "davies_fig6_7_feet.svg").matches("<circle").count();
@@ -166,7 +145,7 @@ fn without_joints_or_traces_the_figures_are_left_out_with_the_reason() {
     write_trace(&dir.join("traces/a.csv"), &trace).unwrap();
     let row = Row {
         trace: Some("traces/a.csv".to_owned()),
-        ..row(METHOD, None, SUITE, SCENARIO)
+        ..row(PLACE.method, None, PLACE.suite, PLACE.scenario)
     };
     RowStore::open(&dir).unwrap().push(row).unwrap();
     let notes = drawn(&dir).notes;
@@ -181,12 +160,12 @@ fn without_joints_or_traces_the_figures_are_left_out_with_the_reason() {
 
 #[test]
 fn each_foot_stands_alone_twice_in_turn() {
-    let (case, soles) = walk_case(0.01).unwrap();
-    let made_up = row(METHOD, None, SUITE, SCENARIO);
+    let (case, soles) = walk_case(PLACE, 0.01).unwrap();
+    let made_up = row(PLACE.method, None, PLACE.suite, PLACE.scenario);
     let walked = Walked {
         run: Labelled {
             row: &made_up,
-            label: METHOD.to_owned(),
+            label: PLACE.method.to_owned(),
             n: None,
         },
         trace: Trace::default(),

@@ -35,8 +35,9 @@ pub(super) fn errors(limbs: &Limbs<'_>) -> Result<String, Obstacle> {
     share_y(&mut panels);
     let title = "Pose error FK(IK(T)) − T of all solutions".to_owned();
     let remarks = vec![
-        "Error: the larger of distance (m) and rotation (rad), by decades; the mark is in the middle of its decade, on the \
-         lower edge if there is none. The lowest decade also holds what is smaller, zeros among it."
+        "Error: the larger of distance (m) and rotation (rad). Solutions are counted by the decade of their error: a mark \
+         stands in the middle of its decade, and on the lower edge of the panel if no solution is in that decade. The lowest \
+         decade also holds what is smaller, zeros among it."
             .to_owned(),
     ];
     let figure = Figure::new(title, vec![PanelRow::new(330.0, panels)]).with_remarks(remarks);
@@ -44,7 +45,7 @@ pub(super) fn errors(limbs: &Limbs<'_>) -> Result<String, Obstacle> {
 }
 
 fn panel(title: &str, rows: &[(&LimbRow, &GridFindings)], criterion: f64) -> Panel {
-    let mut sums: BTreeMap<&str, (Style, BTreeMap<i32, u64>)> = BTreeMap::new();
+    let mut sums: BTreeMap<String, (Style, BTreeMap<i32, u64>)> = BTreeMap::new();
     for (row, found) in rows {
         let (name, style) = family(row);
         let sum = &mut sums.entry(name).or_insert((style, BTreeMap::new())).1;
@@ -65,7 +66,7 @@ fn panel(title: &str, rows: &[(&LimbRow, &GridFindings)], criterion: f64) -> Pan
             (10_f64.powf(f64::from(decade) + 0.5), count as f64 / all as f64)
         };
         panel.curves.push(Curve {
-            name: name.to_owned(),
+            name,
             points: (first..=last).map(share).collect(),
             style,
             width: 1.6,

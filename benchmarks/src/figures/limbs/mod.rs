@@ -5,7 +5,7 @@ mod errors;
 mod postures;
 mod workspace;
 
-use super::style::{BLUE, Dash, GREEN, Marker, ORANGE, PURPLE, Style, VERMILLION};
+use super::style::{BLACK, BLUE, Dash, GREEN, Marker, ORANGE, PURPLE, Style, VERMILLION};
 use super::{Drawn, FigureError, Obstacle, remove_stale};
 use crate::limbs::{Findings, LIMBS_FILE, LimbRow, read_limbs};
 use crate::records_io::write_atomically;
@@ -69,17 +69,20 @@ pub(super) fn draw(dir: &Path, drawn: &mut Drawn) -> Result<(), FigureError> {
     Ok(())
 }
 
-/// Name and look of a family of limbs.
-fn family(row: &LimbRow) -> (&'static str, Style) {
+/// Name and look of a family of limbs; of a general one without the axes that meet.
+fn family(row: &LimbRow) -> (String, Style) {
     let look = |colour, dash, marker| Style { colour, dash, marker };
-    match row.family.as_str() {
-        "leg of the paper" => ("legs", look(BLUE, Dash::Solid, Marker::Circle)),
-        "arm of the paper" => ("arms", look(VERMILLION, Dash::Long, Marker::Square)),
-        "arm of four joints" => ("arms of four joints", look(GREEN, Dash::Short, Marker::Triangle)),
-        name if name.ends_with("quartic") => ("general, quartic", look(ORANGE, Dash::Dotted, Marker::Ring)),
-        _ => (
-            "general, two quadratics",
-            look(PURPLE, Dash::Dotted, Marker::Diamond),
-        ),
-    }
+    let style = match row.family.as_str() {
+        "leg of the paper" => look(BLUE, Dash::Solid, Marker::Circle),
+        "arm of the paper" => look(VERMILLION, Dash::Long, Marker::Square),
+        "arm of four joints" => look(GREEN, Dash::Short, Marker::Triangle),
+        name if name.ends_with("quartic") => look(ORANGE, Dash::Dotted, Marker::Ring),
+        name if name.ends_with("a5 = 0") => look(PURPLE, Dash::Dotted, Marker::Diamond),
+        _ => look(BLACK, Dash::Dotted, Marker::Cross),
+    };
+    let name = match row.family.strip_prefix("general, ") {
+        Some(rest) => format!("general, {}", rest.rsplit(", ").next().unwrap_or(rest)),
+        None => row.family.clone(),
+    };
+    (name, style)
 }

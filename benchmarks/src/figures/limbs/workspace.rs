@@ -4,6 +4,7 @@ use super::super::Obstacle;
 use super::super::axis::Axis;
 use super::super::figure::{Figure, PanelRow};
 use super::super::panel::{Aspect, Band, Curve, Dot, Markers, Panel};
+use super::super::sheet::{Key, Shows};
 use super::super::style::{BLACK, BLUE, Dash, GREEN, GREY, Marker, ORANGE, PURPLE, Style, VERMILLION};
 use super::Limbs;
 use crate::limbs::{Findings, LimbRow, ReachFindings, SliceFindings};
@@ -45,8 +46,8 @@ pub(super) fn workspace(limbs: &Limbs<'_>) -> Result<String, Obstacle> {
         reach.iter().copied().filter(|(row, _)| is_of(row)).collect()
     };
     let fractions = [("legs", of("leg of")), ("arms", of("arm of the paper"))];
-    let fractions = fractions.iter().filter(|(_, rows)| !rows.is_empty());
-    let panels: Vec<Panel> = fractions.map(|(title, rows)| reach_panel(title, rows)).collect();
+    let some = fractions.iter().filter(|(_, rows)| !rows.is_empty());
+    let panels: Vec<Panel> = some.map(|(title, rows)| reach_panel(title, rows)).collect();
     let mut remarks = vec![
         "Above: distinct solutions over the sagittal plane through the point where the first three axes meet (cross; of arm6 \
          the origin of its first axis), turning freely or within limits, the end at roll, pitch, yaw in the title (rad), else level; white: out of reach."
@@ -61,8 +62,47 @@ pub(super) fn workspace(limbs: &Limbs<'_>) -> Result<String, Obstacle> {
         );
     }
     let title = "Where a limb has how many solutions, and how often an orientation can be reached".to_owned();
-    let figure = Figure::new(title, rows).with_remarks(remarks);
+    let mut figure = Figure::new(title, rows).with_remarks(remarks);
+    let slices: Vec<&SliceFindings> = slices.iter().map(|(_, slice)| *slice).collect();
+    let mut robots: Vec<&str> = Vec::new();
+    for (row, _) in fractions.iter().flat_map(|(_, rows)| rows) {
+        if !robots.contains(&row.robot.as_str()) {
+            robots.push(&row.robot);
+        }
+    }
+    figure.keys.extend(robots.into_iter().map(robot_key));
+    figure.keys.extend(class_keys(&slices));
     Ok(figure.render()?)
+}
+
+/// Legend entry of a robot: its line and its mark.
+fn robot_key(robot: &str) -> Key {
+    Key {
+        name: robot.to_owned(),
+        style: look(robot),
+        shows: Shows::Both,
+    }
+}
+
+/// Legend entries of the numbers of solutions that occur.
+fn class_keys(slices: &[&SliceFindings]) -> Vec<Key> {
+    let occurs = |from: u32, to: u32| {
+        let mut counts = slices
+            .iter()
+            .flat_map(|s| s.distinct.iter().chain(&s.within_limits));
+        counts.any(|line| line.iter().any(|n| (from..=to).contains(n)))
+    };
+    let classes = CLASSES.iter().filter(|(from, to, _)| occurs(*from, *to));
+    let key = |(from, to, colour): &(u32, u32, RGBColor)| Key {
+        name: format!("{from} or {to} solutions"),
+        style: Style {
+            colour: *colour,
+            dash: Dash::Solid,
+            marker: Marker::Square,
+        },
+        shows: Shows::Area,
+    };
+    classes.map(key).collect()
 }
 
 /// All solutions, and those within limits that leave some out.
@@ -94,20 +134,13 @@ fn slice_panel(title: &str, slice: &SliceFindings, counts: &[Vec<u32>]) -> Panel
     panel.aspect = Aspect::Equal;
     let half_z = half_step(&slice.z_m);
     for (from, to, colour) in CLASSES {
-        let name = format!("{from} or {to} solutions");
-        // Nothing, so that the legend has all classes in their order.
-        panel.bands.push(Band {
-            name: name.clone(),
-            colour,
-            points: Vec::new(),
-        });
         for (z, line) in slice.z_m.iter().zip(counts) {
             let is_of = |n: &u32| (from..=to).contains(n);
             for (first, last) in runs(line, is_of) {
                 let half_x = half_step(&slice.x_m);
                 let edge = |x: f64| (x, z - half_z, z + half_z);
                 panel.bands.push(Band {
-                    name: name.clone(),
+                    name: String::new(),
                     colour,
                     points: vec![edge(slice.x_m[first] - half_x), edge(slice.x_m[last] + half_x)],
                 });
@@ -158,18 +191,22 @@ const LOOKS: [(RGBColor, Marker); 6] = [
 ];
 const ROBOTS: [&str; 5] = ["hubo", "hrp2", "asimo", "hoap2", "bioloid"];
 
+fn look(robot: &str) -> Style {
+    let known = ROBOTS.iter().position(|known| *known == robot);
+    let (colour, marker) = LOOKS[known.unwrap_or(LOOKS.len() - 1)];
+    Style {
+        colour,
+        dash: Dash::Solid,
+        marker,
+    }
+}
+
 fn reach_panel(title: &str, rows: &[(&LimbRow, &ReachFindings)]) -> Panel {
     let x = Axis::linear("distance / stretched limb");
     let y = Axis::linear("part of the orientations").with_range(-0.03, 1.08);
     let mut panel = Panel::new(title, x, y);
     for (row, found) in rows {
-        let known = ROBOTS.iter().position(|robot| *robot == row.robot);
-        let (colour, marker) = LOOKS[known.unwrap_or(LOOKS.len() - 1)];
-        let style = Style {
-            colour,
-            dash: Dash::Solid,
-            marker,
-        };
+        let style = look(&row.robot);
         let beyond = row.parameters.get("beyond").and_then(serde_json::Value::as_f64);
         let far = found.distance_m.last().copied().unwrap_or(1.0) / beyond.unwrap_or(1.0);
         let at = found.distance_m.iter().map(|d| d / far);
@@ -178,7 +215,7 @@ fn reach_panel(title: &str, rows: &[(&LimbRow, &ReachFindings)]) -> Panel {
             .iter()
             .map(|n| *n as f64 / found.orientations as f64);
         panel.curves.push(Curve {
-            name: row.robot.clone(),
+            name: String::new(),
             points: at.clone().zip(found.expected.iter().flatten().copied()).collect(),
             style,
             width: 1.2,
@@ -186,8 +223,8 @@ fn reach_panel(title: &str, rows: &[(&LimbRow, &ReachFindings)]) -> Panel {
         });
         panel.dots.extend(at.zip(measured).map(|at| Dot {
             at,
-            colour,
-            marker,
+            colour: style.colour,
+            marker: style.marker,
             radius: 2.6,
         }));
     }

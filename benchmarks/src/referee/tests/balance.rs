@@ -214,6 +214,7 @@ fn judged(
         targets: &vec![0.0; 6 * q.len()],
         phases: &[PhaseId(0)],
         support,
+        walk: None,
     };
     (referee.judge(&run), referee.trace(&run, &StepEfforts::default()))
 }
@@ -395,6 +396,7 @@ fn balance_is_judged_where_soles_are_named_and_does_not_decide_survival() {
         targets: &[0.0; 12],
         phases: &[PhaseId(0)],
         support: &[],
+        walk: None,
     });
     close(quality.gcom_margin_min_m.unwrap(), -0.4);
     close(quality.zmp_margin_min_m.unwrap(), -0.4);

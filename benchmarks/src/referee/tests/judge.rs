@@ -23,6 +23,7 @@ fn judge_at_rest(problem: &Arc<Problem>, x: &[f64], q: &[Vec<f64>], dt_s: f64) -
         targets: &targets,
         phases: &ONLY,
         support: &[],
+        walk: None,
     })
 }
 
@@ -65,6 +66,7 @@ fn errors_of_the_centre_of_mass() {
         targets: &targets,
         phases: &ONLY,
         support: &[],
+        walk: None,
     });
     close(quality.com_error_rms_m.unwrap(), (50.0_f64 / 3.0).sqrt());
     assert_eq!(quality.com_error_max_m, Some(5.0));
@@ -230,6 +232,7 @@ fn tasks_count_in_the_phases_they_belong_to() {
         targets: &targets,
         phases: &phases,
         support: &[],
+        walk: None,
     });
     assert_eq!(
         (quality.hard_error_max["tip_m"], quality.hard_error_max["com_m"]),
@@ -358,6 +361,7 @@ fn exit_of(knee: [f64; 7]) -> Option<f64> {
             targets: &targets,
             phases: &ONLY,
             support: &[],
+            walk: None,
         })
         .singularity_exit_s
 }
@@ -404,6 +408,7 @@ fn torques_are_averaged_from_one_second_on() {
         targets: &targets,
         phases: &ONLY,
         support: &[],
+        walk: None,
     };
     let asked = Referee::new(
         &problem,
@@ -569,6 +574,7 @@ fn runs_that_do_not_fit_the_problem_do_not_survive() {
         targets: &targets,
         phases: &ONLY,
         support: &[],
+        walk: None,
     };
     let judged = |run: Run<'_>| referee(&problem).judge(&run);
     assert!(

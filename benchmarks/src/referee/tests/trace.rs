@@ -23,6 +23,7 @@ fn columns_and_rows_of_the_shoot_out() {
         targets: &targets,
         phases: &[PhaseId(0)],
         support: &[],
+        walk: None,
     };
     let efforts = StepEfforts {
         step_us: &[7.5, 8.5],
@@ -86,6 +87,7 @@ fn rows_stop_where_the_run_cannot_be_read() {
         targets: &[0.0; 24],
         phases: &[PhaseId(0)],
         support: &[],
+        walk: None,
     };
     let trace = referee(&problem).trace(&run, &StepEfforts::default());
     assert_eq!(trace.column("com_error_m").unwrap(), [0.0, 1.0]);
@@ -132,6 +134,7 @@ fn quaternion_and_posture_targets_have_columns() {
         targets: &targets,
         phases: &[PhaseId(0)],
         support: &[],
+        walk: None,
     };
     let trace = referee(&Arc::new(problem)).trace(&run, &StepEfforts::default());
     let value = |name: &str| trace.column(name).unwrap_or_else(|| panic!("no column {name}"))[0];

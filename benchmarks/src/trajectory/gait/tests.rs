@@ -219,7 +219,7 @@ fn terms_add_to_the_walk_and_holds_are_refused() {
     assert!((target(&case, "waist", 2, 3.0).0 - 0.145).abs() < 1e-15);
     let message = build(&term("hold = { value = 0.15 }")).unwrap_err().to_string();
     assert!(
-        message.contains("scenarios[0].motion[0]") && message.contains("what the gait moves"),
+        message.contains("scenarios[0].motion[0]") && message.contains("what the gait or walk moves"),
         "{message}"
     );
 }

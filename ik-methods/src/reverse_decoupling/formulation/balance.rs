@@ -2,8 +2,8 @@
 
 use super::plan::Target;
 use super::rates::{centre_of_mass_rate, is_regular, joint_rates};
-use super::region::{Halfspace, Reach, Region};
-use super::whole_body::{Candidate, OUTSIDE_RAD, Step, Work, conclude, root_pose};
+use super::region::{Halfspace, Reach, Region, Ring};
+use super::whole_body::{Candidate, Free, OUTSIDE_RAD, Step, Work, conclude, root_pose};
 use ik_core::evaluator::Evaluator;
 use ik_core::formulation::Termination;
 use nalgebra::Vector3;
@@ -44,10 +44,10 @@ impl Step<'_> {
         start.q.copy_from_slice(self.step.q_prev);
         start.merit.away = centre - start.page.centre_of_mass();
         let ahead = work.best.merit.away;
-        let (newton, _) = self.next(Way::Along, &work.best, &work.region);
+        let (newton, _) = self.next(Way::Along, &work.best, &mut work.region);
         for length in FIRST_LENGTHS {
             let guess = length.map_or(newton, |part| work.region.nearest(&(before + ahead * part)));
-            self.evaluate(guess, centre, work, eval);
+            self.evaluate(guess, centre, Free::Rests, work, eval);
             if length.is_none() || work.trial.merit.is_better_than(&work.best.merit) {
                 std::mem::swap(&mut work.trial, &mut work.best);
             }
@@ -68,10 +68,23 @@ impl Step<'_> {
                 return left.unwrap_or(Termination::Budget);
             }
             if !self.improve(centre, work, eval) {
+                if left.is_some() && self.improves_where_free(centre, work, eval) {
+                    continue;
+                }
                 let missing_m = merit.away.norm();
                 return left.unwrap_or(Termination::OutOfReach { missing_m });
             }
         }
+    }
+
+    /// Stays in place and lets free joints give way.
+    fn improves_where_free(&self, centre: &Vector3<f64>, work: &mut Work, eval: &mut Evaluator) -> bool {
+        self.evaluate(work.best.origin, centre, Free::GivesWay, work, eval);
+        let improves = work.trial.merit.is_better_than(&work.best.merit);
+        if improves {
+            std::mem::swap(&mut work.trial, &mut work.best);
+        }
+        improves
     }
 
     /// Where the root may go next from a candidate, and the centre of mass that is predicted to be left there (m).
@@ -79,7 +92,7 @@ impl Step<'_> {
     /// Heuristic: next to a straight leg D is dominated by how fast its knee bends, and Newton steps that lead out of the
     /// region throw the waist about (measured, they lose coman/asymmetric). There the waist first tries to go with the centre
     /// of mass to the nearest point of the region.
-    fn next(&self, way: Way, from: &Candidate, region: &Region) -> (Vector3<f64>, Vector3<f64>) {
+    fn next(&self, way: Way, from: &Candidate, region: &mut Region) -> (Vector3<f64>, Vector3<f64>) {
         let (origin, away) = (from.origin, from.merit.away);
         let along = || {
             let target = region.nearest(&(origin + away));
@@ -114,7 +127,7 @@ impl Step<'_> {
             let mut cuts = 0;
             loop {
                 let (target, predicted) = if merit.stands() {
-                    self.next(way, &work.best, &work.region)
+                    self.next(way, &work.best, &mut work.region)
                 } else {
                     (work.region.nearest(&from), Vector3::zeros())
                 };
@@ -122,7 +135,7 @@ impl Step<'_> {
                 let Some(length) = lengths.next().filter(|_| gains) else {
                     break;
                 };
-                self.evaluate(from + (target - from) * *length, centre, work, eval);
+                self.evaluate(from + (target - from) * *length, centre, Free::Rests, work, eval);
                 if work.trial.merit.is_better_than(&work.best.merit) {
                     std::mem::swap(&mut work.trial, &mut work.best);
                     return true;
@@ -166,7 +179,7 @@ impl Step<'_> {
         }
     }
 
-    /// The shells of hard limbs within the intervals of their hinges.
+    /// The shells of hard limbs within the intervals of their hinges, and the rings of arms.
     fn fill_region(&self, work: &mut Work) {
         work.region.clear();
         let first = self.robot.root();
@@ -182,19 +195,36 @@ impl Step<'_> {
                 Target::Pose(..) => target * shell.tip_point,
                 Target::Point(_) => target.translation.vector.into(),
             };
+            let arm = self.rotation * shell.base_point.coords;
             work.region.add(Reach {
-                arm: self.rotation * shell.base_point.coords,
+                arm,
                 centre: end.coords,
                 least_m,
                 largest_m,
             });
+            if let Some((axis, forearm_m, upper_arm_m)) = plan.ring {
+                work.region.add_ring(Ring {
+                    arm,
+                    wrist: end.coords,
+                    axis: target.rotation * axis,
+                    forearm_m,
+                    upper_arm_m,
+                });
+            }
         }
     }
 
     /// Solves all limbs with the root at `origin`, then the tree for the centre of mass: the trial.
-    fn evaluate(&self, origin: Vector3<f64>, centre: &Vector3<f64>, work: &mut Work, eval: &mut Evaluator) {
+    fn evaluate(
+        &self,
+        origin: Vector3<f64>,
+        centre: &Vector3<f64>,
+        free: Free,
+        work: &mut Work,
+        eval: &mut Evaluator,
+    ) {
         let Work { targets, trial, .. } = work;
-        self.limbs(origin, targets, trial);
+        self.limbs(origin, targets, free, trial);
         if trial.merit.missing_m == 0.0 {
             eval.pass(&trial.q, &mut trial.page);
             trial.merit.away = centre - trial.page.centre_of_mass();

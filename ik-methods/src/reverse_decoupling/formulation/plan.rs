@@ -13,6 +13,9 @@ use ik_core::spatial::{rpy, so3};
 use ik_core::task::{OrientationCoordinates, Priority, Track};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
+/// Quaternions of targets further from unit length than this are no rotations.
+const UNIT_TOLERANCE: f64 = 1e-6;
+
 /// Where an orientation target stands, and how its frame is turned in its body.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Attitude {
@@ -22,6 +25,19 @@ pub(super) struct Attitude {
 }
 
 impl Attitude {
+    /// Whether the numbers are a rotation, up to the length of a quaternion.
+    fn is_rotation(&self, x: &[f64]) -> bool {
+        let length = || {
+            x[self.x..self.x + 4]
+                .iter()
+                .fold(0.0, |length: f64, c| length.hypot(*c))
+        };
+        match self.coordinates {
+            OrientationCoordinates::RollPitchYaw => true,
+            OrientationCoordinates::Log => (length() - 1.0).abs() < UNIT_TOLERANCE,
+        }
+    }
+
     /// Rotation of the body.
     pub(super) fn of_body(&self, x: &[f64]) -> UnitQuaternion<f64> {
         let numbers = &x[self.x..];
@@ -102,6 +118,8 @@ pub(super) struct LimbPlan {
     /// The three axes that meet, of a limb that takes a pose: at which end, and where, in the root or in the last body (m).
     pub(super) triple: (End, Point3<f64>),
     pub(super) shell: Option<Shell>,
+    /// Of an arm of the paper: its last axis in the last body (unit), and the lengths of forearm and upper arm (m).
+    pub(super) ring: Option<(Vector3<f64>, f64, f64)>,
     pub(super) is_hard: bool,
 }
 
@@ -166,6 +184,19 @@ impl Plan {
             limbs: plans,
             idle,
         })
+    }
+
+    /// Whether all orientation targets are rotations.
+    pub(super) fn has_rotations(&self, x: &[f64]) -> bool {
+        let waist = match &self.waist {
+            Waist::Fixed => true,
+            Waist::Prescribed(attitude, _) | Waist::Balanced(attitude, _) => attitude.is_rotation(x),
+        };
+        let of_limb = |limb: &LimbPlan| match &limb.target {
+            Target::Pose(attitude, _) => attitude.is_rotation(x),
+            Target::Point(_) => true,
+        };
+        waist && self.limbs.iter().all(of_limb)
     }
 
     /// Remarks on what is left out.
@@ -301,7 +332,7 @@ fn limb_plan(
             "an orientation alone does not fix the joints of the limb at `{name}`"
         )));
     };
-    let plan = |limb, target, triple, shell| LimbPlan {
+    let plan = |limb, target, triple, shell, ring| LimbPlan {
         limb,
         target,
         tip: body,
@@ -310,6 +341,7 @@ fn limb_plan(
         coordinates,
         triple,
         shell,
+        ring,
         is_hard: asked.is_hard,
     };
     if let Some(attitude) = asked.orientation {
@@ -328,12 +360,23 @@ fn limb_plan(
             Family::FourJointArm => None,
             _ => Shell::of(robot, &report.joints, &table, end),
         };
-        Ok(plan(limb, Target::Pose(attitude, place), (end, triple), shell))
+        let last_axis = tip.inverse_transform_vector(&lines[lines.len() - 1].axis);
+        let ring = match family {
+            Family::Arm => Some((last_axis, table.rows[4].d.abs(), table.rows[2].d.abs())),
+            _ => None,
+        };
+        Ok(plan(
+            limb,
+            Target::Pose(attitude, place),
+            (end, triple),
+            shell,
+            ring,
+        ))
     } else {
         let point = place.in_body;
         let limb = Limb::placing(robot, report, &point).map_err(|e| declined(e.to_string()))?;
         let table = with_virtual_wrist(robot, report, &point);
         let shell = table.and_then(|table| Shell::of_point(robot, &report.joints, &table, &point));
-        Ok(plan(limb, Target::Point(place), (End::Tip, point), shell))
+        Ok(plan(limb, Target::Point(place), (End::Tip, point), shell, None))
     }
 }

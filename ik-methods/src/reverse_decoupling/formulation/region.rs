@@ -1,4 +1,5 @@
-//! Where the root may stand: in the shells that limbs span, and on the right side of cuts along the limits of other joints.
+//! Where the root may stand: in the shells that limbs span, where an arm's hand keeps its attitude, and on the right side of cuts
+//! along the limits of other joints.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -15,44 +16,49 @@ pub(super) struct Reach {
     pub(super) largest_m: f64,
 }
 
-impl Reach {
-    /// Where the origin of the root would be if the point were in the centre (m, world).
-    fn middle(&self) -> Vector3<f64> {
-        self.centre - self.arm
+/// Where an arm whose hand is held has its elbow: on a circle about the wrist, across the last axis. The shoulder is one upper
+/// arm away from a point of it. This is `|p'z| ≤ l2 |S4|` of the source, in the world.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ring {
+    /// The shoulder relative to the origin of the root (m, world axes).
+    pub(super) arm: Vector3<f64>,
+    /// Wrist (m, world).
+    pub(super) wrist: Vector3<f64>,
+    /// Last axis (unit, world).
+    pub(super) axis: Vector3<f64>,
+    /// Length of the forearm (m).
+    pub(super) forearm_m: f64,
+    /// Length of the upper arm (m).
+    pub(super) upper_arm_m: f64,
+}
+
+impl Ring {
+    /// Where the origin of the root would be with the shoulder in the point of the circle nearest to it, and in the farthest one.
+    fn nearest_and_farthest(&self, x: &Vector3<f64>) -> [Vector3<f64>; 2] {
+        let middle = self.wrist - self.arm;
+        let away = x - middle;
+        let across = away - self.axis * self.axis.dot(&away);
+        let length = across.norm();
+        let direction = if length > 0.0 {
+            across / length
+        } else {
+            any_across(&self.axis)
+        };
+        [
+            middle + direction * self.forearm_m,
+            middle - direction * self.forearm_m,
+        ]
     }
 }
 
 /// `n · x ≤ h`, |n| = 1.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Halfspace {
     n: Vector3<f64>,
     h: f64,
 }
 
 impl Halfspace {
-    /// The nearer side of a shell, linearised at `origin`.
-    fn of(shell: &Reach, origin: &Vector3<f64>) -> Self {
-        let away = origin - shell.middle();
-        let distance = away.norm();
-        let n = if distance > 0.0 {
-            away / distance
-        } else {
-            Vector3::z()
-        };
-        let offset = n.dot(origin) - distance;
-        if distance > 0.5 * (shell.least_m + shell.largest_m) {
-            Self {
-                n,
-                h: offset + shell.largest_m,
-            }
-        } else {
-            Self {
-                n: -n,
-                h: -(offset + shell.least_m),
-            }
-        }
-    }
-
     /// Where something with gradient `rate` at `origin` is less by `excess` than there; none if it does not change.
     pub(super) fn below(origin: &Vector3<f64>, rate: &Vector3<f64>, excess: f64) -> Option<Self> {
         let norm = rate.norm();
@@ -63,42 +69,92 @@ impl Halfspace {
     }
 }
 
-/// Most halfspaces that are taken into account at once: those of four limbs and as many cuts.
-const MOST: usize = 8;
-/// Most surfaces: both sides of the shells of four limbs, and cuts.
-const MOST_SURFACES: usize = 12;
+/// One condition on a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Condition {
+    Within { centre: Vector3<f64>, radius: f64 },
+    Beyond { centre: Vector3<f64>, radius: f64 },
+    Below(Halfspace),
+}
+
+impl Condition {
+    /// By how much a point misses it (m); negative inside.
+    fn missed(&self, x: &Vector3<f64>) -> f64 {
+        match self {
+            Self::Within { centre, radius } => (x - centre).norm() - radius,
+            Self::Beyond { centre, radius } => radius - (x - centre).norm(),
+            Self::Below(plane) => plane.n.dot(x) - plane.h,
+        }
+    }
+
+    /// The halfspace that touches it where `origin` is nearest to its border.
+    fn linearised(&self, origin: &Vector3<f64>) -> Halfspace {
+        let outwards = |centre: &Vector3<f64>| {
+            let away = origin - centre;
+            let distance = away.norm();
+            if distance > 0.0 {
+                away / distance
+            } else {
+                Vector3::z()
+            }
+        };
+        match self {
+            Self::Within { centre, radius } => {
+                let n = outwards(centre);
+                Halfspace {
+                    n,
+                    h: n.dot(centre) + radius,
+                }
+            }
+            Self::Beyond { centre, radius } => {
+                let n = -outwards(centre);
+                Halfspace {
+                    n,
+                    h: n.dot(centre) - radius,
+                }
+            }
+            Self::Below(plane) => *plane,
+        }
+    }
+}
+
+/// Most cuts; beyond them the oldest goes.
+const MOST_CUTS: usize = 8;
+/// Conditions a projection keeps in mind.
+const MOST_KEPT: usize = 6;
+/// Most rounds of a projection, each with the condition that was missed most.
+const ROUNDS: usize = 16;
 /// Gram determinants below this, of unit normals, are those of dependent planes.
 const DEPENDENT: f64 = 1e-12;
 /// Conditions missed by less than this (m) hold.
 const SLACK_M: f64 = 1e-12;
 
-/// What bounds the region.
-#[derive(Clone, Copy, Debug)]
-enum Surface {
-    Sphere { centre: Vector3<f64>, radius: f64 },
-    Plane(Halfspace),
-}
-
-/// Shells and cuts of one control step; sized once.
+/// Shells, rings and cuts of one control step; sized once.
 #[derive(Debug)]
 pub(super) struct Region {
     shells: Vec<Reach>,
+    rings: Vec<Ring>,
     /// Cuts with the joint coordinate they belong to.
     cuts: Vec<(usize, Halfspace)>,
+    /// Halfspaces of [`Region::best_motion`].
+    linearised: Vec<Halfspace>,
 }
 
 impl Region {
-    /// Room for the shells of `limbs` limbs.
+    /// Room for `limbs` limbs.
     pub(super) fn new(limbs: usize) -> Self {
         Self {
             shells: Vec::with_capacity(limbs),
-            cuts: Vec::with_capacity(MOST),
+            rings: Vec::with_capacity(limbs),
+            cuts: Vec::with_capacity(MOST_CUTS),
+            linearised: Vec::with_capacity(4 * limbs + MOST_CUTS),
         }
     }
 
     /// Forgets everything.
     pub(super) fn clear(&mut self) {
         self.shells.clear();
+        self.rings.clear();
         self.cuts.clear();
     }
 
@@ -107,10 +163,15 @@ impl Region {
         self.shells.push(shell);
     }
 
-    /// Adds a cut along the limit of a joint coordinate, in place of an older one; beyond [`MOST`] the oldest goes.
+    /// Adds a ring.
+    pub(super) fn add_ring(&mut self, ring: Ring) {
+        self.rings.push(ring);
+    }
+
+    /// Adds a cut along the limit of a joint coordinate, in place of an older one.
     pub(super) fn cut(&mut self, coordinate: usize, cut: Halfspace) {
         self.cuts.retain(|(other, _)| *other != coordinate);
-        if self.cuts.len() == self.cuts.capacity() {
+        if self.cuts.len() == MOST_CUTS {
             self.cuts.remove(0);
         }
         self.cuts.push((coordinate, cut));
@@ -118,151 +179,166 @@ impl Region {
 
     /// Whether a point is in the region.
     pub(super) fn contains(&self, x: &Vector3<f64>) -> bool {
-        self.missed(x) <= SLACK_M
+        self.conditions(*x)
+            .all(|condition| condition.missed(x) <= SLACK_M)
     }
 
-    /// By how much a point misses the region (m): the greatest of all conditions, 0 inside.
-    fn missed(&self, x: &Vector3<f64>) -> f64 {
-        let of_shell = |shell: &Reach| {
-            let distance = (x - shell.middle()).norm();
-            (distance - shell.largest_m).max(shell.least_m - distance)
-        };
-        let shells = self.shells.iter().map(of_shell);
-        let cuts = self.cuts.iter().map(|(_, cut)| cut.n.dot(x) - cut.h);
-        shells.chain(cuts).fold(0.0, f64::max)
+    /// All conditions; those of rings are spheres that touch them as seen from `x`.
+    fn conditions(&self, x: Vector3<f64>) -> impl Iterator<Item = Condition> {
+        let shells = self.shells.iter().flat_map(|shell| {
+            let centre = shell.centre - shell.arm;
+            let (largest, least) = (shell.largest_m, shell.least_m);
+            [
+                Condition::Within {
+                    centre,
+                    radius: largest,
+                },
+                Condition::Beyond {
+                    centre,
+                    radius: least,
+                },
+            ]
+        });
+        let rings = self.rings.iter().flat_map(move |ring| {
+            let [nearest, farthest] = ring.nearest_and_farthest(&x);
+            let radius = ring.upper_arm_m;
+            [
+                Condition::Within {
+                    centre: nearest,
+                    radius,
+                },
+                Condition::Beyond {
+                    centre: farthest,
+                    radius,
+                },
+            ]
+        });
+        let cuts = self.cuts.iter().map(|(_, cut)| Condition::Below(*cut));
+        shells.chain(rings).chain(cuts)
     }
 
-    /// The motion dx from `origin` that comes nearest to `D dx = wanted` within cuts, and shells in linear approximation;
-    /// `inverse` is that of D.
+    /// The motion dx from `origin` that comes nearest to `D dx = wanted` within cuts, and shells and rings in linear
+    /// approximation; `inverse` is that of D.
     pub(super) fn best_motion(
-        &self,
+        &mut self,
         wanted: &Vector3<f64>,
         origin: &Vector3<f64>,
         inverse: &Matrix3<f64>,
     ) -> Vector3<f64> {
-        let (mut spaces, count) = self.linearised(origin);
-        for space in &mut spaces[..count] {
+        let mut linearised = std::mem::take(&mut self.linearised);
+        linearised.clear();
+        linearised.extend(self.conditions(*origin).map(|condition| {
+            let plane = condition.linearised(origin);
             // n · dx = (D⁻ᵀ n) · (D dx)
-            let n = inverse.tr_mul(&space.n);
+            let n = inverse.tr_mul(&plane.n);
             let norm = n.norm();
-            *space = Halfspace {
+            Halfspace {
                 n: n / norm,
-                h: (space.h - space.n.dot(origin)) / norm,
-            };
-        }
-        inverse * nearest_in(wanted, &spaces[..count])
-    }
-
-    /// The point nearest to `target` in the region; where it is empty, one of those that miss least.
-    ///
-    /// It is the nearest point of one, two or three of the surfaces, and all of these are tried: the region need not be convex.
-    pub(super) fn nearest(&self, target: &Vector3<f64>) -> Vector3<f64> {
-        let (surfaces, count) = self.surfaces();
-        let surfaces = &surfaces[..count];
-        let rank = |x: &Vector3<f64>| (self.missed(x).max(SLACK_M), (x - target).norm_squared());
-        let mut best = (rank(target), *target);
-        if best.0.0 <= SLACK_M {
-            return *target;
-        }
-        for subset in 1_u32..1 << count {
-            if subset.count_ones() > 3 {
-                continue;
+                h: (plane.h - plane.n.dot(origin)) / norm,
             }
-            let chosen = (0..count).filter(|i| subset & (1 << i) != 0);
-            for candidate in nearest_on(target, chosen.map(|i| &surfaces[i]))
-                .into_iter()
-                .flatten()
-            {
-                let rank = rank(&candidate);
-                if rank < best.0 {
-                    best = (rank, candidate);
-                }
-            }
-        }
-        best.1
-    }
-
-    fn surfaces(&self) -> ([Surface; MOST_SURFACES], usize) {
-        let mut surfaces = [Surface::Plane(Halfspace::default()); MOST_SURFACES];
-        let spheres = self.shells.iter().flat_map(|shell| {
-            let sphere = |radius| Surface::Sphere {
-                centre: shell.middle(),
-                radius,
-            };
-            [sphere(shell.largest_m), sphere(shell.least_m)]
+        }));
+        let caused = project(wanted, |_| {
+            linearised.iter().map(|plane| Condition::Below(*plane))
         });
-        let spheres =
-            spheres.filter(|sphere| !matches!(sphere, Surface::Sphere { radius, .. } if *radius <= SLACK_M));
-        let planes = self.cuts.iter().rev().map(|(_, cut)| Surface::Plane(*cut));
-        let mut count = 0;
-        for (to, surface) in surfaces.iter_mut().zip(spheres.chain(planes)) {
-            *to = surface;
-            count += 1;
-        }
-        (surfaces, count)
+        self.linearised = linearised;
+        inverse * caused
     }
 
-    /// Halfspaces that touch the nearer sides of all shells as seen from `origin`, and the cuts.
-    fn linearised(&self, origin: &Vector3<f64>) -> ([Halfspace; MOST], usize) {
-        let mut spaces = [Halfspace::default(); MOST];
-        let shells = self.shells.iter().map(|shell| Halfspace::of(shell, origin));
-        let all = shells.chain(self.cuts.iter().rev().map(|(_, cut)| *cut));
-        let mut count = 0;
-        for (to, space) in spaces.iter_mut().zip(all) {
-            *to = space;
-            count += 1;
-        }
-        (spaces, count)
+    /// The point nearest to `target` in the region, as far as the rounds of [`project`] lead; best effort where it is empty.
+    pub(super) fn nearest(&self, target: &Vector3<f64>) -> Vector3<f64> {
+        project(target, |x| self.conditions(x))
     }
 }
 
-/// The point nearest to `start` in all halfspaces: of the faces, edges and corners the one that all of its planes push to
-/// and that misses no other. Where there is none, the one that misses least.
-fn nearest_in(start: &Vector3<f64>, spaces: &[Halfspace]) -> Vector3<f64> {
-    let miss = |x: &Vector3<f64>| spaces.iter().map(|s| s.n.dot(x) - s.h).fold(0.0, f64::max);
-    let (mut best, mut least) = (*start, miss(start));
-    for subset in 1_u32..1 << spaces.len() {
-        if least <= SLACK_M {
+/// The point nearest to `target` that meets all conditions: in every round the one that is missed most is kept in mind, and the
+/// nearest point is sought on one, two or three borders of those kept. Where none is found, the point met that missed least.
+fn project<I: Iterator<Item = Condition>>(
+    target: &Vector3<f64>,
+    conditions: impl Fn(Vector3<f64>) -> I,
+) -> Vector3<f64> {
+    let mut kept = [(0, Condition::Below(Halfspace::default())); MOST_KEPT];
+    let mut count = 0;
+    let mut x = *target;
+    let mut best = (f64::INFINITY, x);
+    for round in 0..ROUNDS {
+        let missed = |(_, condition): &(usize, Condition)| condition.missed(&x);
+        let Some(worst) = conditions(x)
+            .enumerate()
+            .max_by(|a, b| missed(a).total_cmp(&missed(b)))
+        else {
+            return x;
+        };
+        let excess = missed(&worst);
+        if excess <= SLACK_M {
+            return x;
+        }
+        if excess < best.0 {
+            best = (excess, x);
+        }
+        let known = kept[..count].iter().position(|(number, _)| *number == worst.0);
+        if known.is_some_and(|known| kept[known] == worst) {
+            // Rounding, or an empty region.
             break;
         }
+        // A sphere that touches a ring replaces the one of a round before.
+        let place = known.unwrap_or(if count < MOST_KEPT {
+            count
+        } else {
+            round % MOST_KEPT
+        });
+        kept[place] = worst;
+        count = count.max(place + 1);
+        x = nearest_of(target, &kept[..count]);
+    }
+    best.1
+}
+
+/// The point nearest to `target` that meets all of a few conditions, or misses them least: of the points nearest to it on
+/// every one, two and three of their borders.
+fn nearest_of(target: &Vector3<f64>, conditions: &[(usize, Condition)]) -> Vector3<f64> {
+    let rank = |x: &Vector3<f64>| {
+        let missed = conditions.iter().map(|(_, condition)| condition.missed(x));
+        (missed.fold(SLACK_M, f64::max), (x - target).norm_squared())
+    };
+    let mut best = (rank(target), *target);
+    for subset in 1_u32..1 << conditions.len() {
         if subset.count_ones() > 3 {
             continue;
         }
-        let (mut planes, mut count) = ([Halfspace::default(); 3], 0);
-        for (_, space) in spaces.iter().enumerate().filter(|(i, _)| subset & (1 << i) != 0) {
-            planes[count] = *space;
-            count += 1;
-        }
-        if let Some((candidate, push)) = on_all(start, &planes[..count]) {
-            if push.iter().any(|&p| p < 0.0) {
-                continue;
-            }
-            let missed = miss(&candidate);
-            if missed < least {
-                (best, least) = (candidate, missed);
+        let chosen = conditions.iter().enumerate();
+        let chosen = chosen
+            .filter(|(i, _)| subset & (1 << i) != 0)
+            .map(|(_, (_, condition))| condition);
+        for candidate in nearest_on(target, chosen).into_iter().flatten() {
+            let rank = rank(&candidate);
+            if rank < best.0 {
+                best = (rank, candidate);
             }
         }
     }
-    best
+    best.1
 }
 
-/// The points nearest to `target` on up to three surfaces: two where a line pierces a sphere, none where planes are parallel.
+/// The points nearest to `target` on up to three borders: two where a line pierces a sphere, none where planes are parallel.
 /// Where spheres and planes do not meet, the points of the planes nearest to the sphere.
 fn nearest_on<'a>(
     target: &Vector3<f64>,
-    surfaces: impl Iterator<Item = &'a Surface>,
+    borders: impl Iterator<Item = &'a Condition>,
 ) -> [Option<Vector3<f64>>; 2] {
     let mut sphere = None;
     let (mut planes, mut count) = ([Halfspace::default(); 3], 0);
-    for surface in surfaces {
-        let plane = match (surface, sphere) {
-            (Surface::Plane(plane), _) => *plane,
-            (Surface::Sphere { centre, radius }, None) => {
+    for border in borders {
+        let plane = match (border, sphere) {
+            (Condition::Below(plane), _) => *plane,
+            (Condition::Within { centre, radius } | Condition::Beyond { centre, radius }, None) => {
                 sphere = Some((*centre, *radius));
                 continue;
             }
             // Where two spheres meet is where a sphere meets the plane of equal powers.
-            (Surface::Sphere { centre, radius }, Some((first, first_radius))) => {
+            (
+                Condition::Within { centre, radius } | Condition::Beyond { centre, radius },
+                Some((first, first_radius)),
+            ) => {
                 let between = centre - first;
                 let distance = between.norm();
                 if distance <= SLACK_M {
@@ -281,9 +357,9 @@ fn nearest_on<'a>(
     }
     let planes = &planes[..count];
     let Some((centre, radius)) = sphere else {
-        return [on_all(target, planes).map(|(point, _)| point), None];
+        return [on_all(target, planes), None];
     };
-    let (Some((target, _)), Some((middle, _))) = (on_all(target, planes), on_all(&centre, planes)) else {
+    let (Some(target), Some(middle)) = (on_all(target, planes), on_all(&centre, planes)) else {
         return [None; 2];
     };
     // On the planes the sphere is a sphere, a circle or two points about `middle`.
@@ -311,8 +387,8 @@ fn any_across(n: &Vector3<f64>) -> Vector3<f64> {
     n.cross(&axis).normalize()
 }
 
-/// The point nearest to `start` on all planes, up to three, and how far each of them pushed; none if they are dependent.
-fn on_all(start: &Vector3<f64>, planes: &[Halfspace]) -> Option<(Vector3<f64>, Vector3<f64>)> {
+/// The point nearest to `start` on all planes, up to three; none if they are dependent.
+fn on_all(start: &Vector3<f64>, planes: &[Halfspace]) -> Option<Vector3<f64>> {
     let (mut gram, mut right) = (Matrix3::identity(), Vector3::zeros());
     for (i, plane) in planes.iter().enumerate() {
         right[i] = plane.n.dot(start) - plane.h;
@@ -325,7 +401,7 @@ fn on_all(start: &Vector3<f64>, planes: &[Halfspace]) -> Option<(Vector3<f64>, V
     }
     let push = gram.try_inverse()? * right;
     let moved = planes.iter().zip(push.iter()).map(|(plane, p)| plane.n * *p);
-    Some((start - moved.sum::<Vector3<f64>>(), push))
+    Some(start - moved.sum::<Vector3<f64>>())
 }
 
 #[cfg(test)]
@@ -420,7 +496,7 @@ mod tests {
     fn the_best_motion_is_nearest_in_what_it_causes() {
         let numbers = &mut numbers(8);
         for _ in 0..100 {
-            let region = region(numbers);
+            let mut region = region(numbers);
             let wanted = vector(numbers);
             let rate =
                 Matrix3::identity() + Matrix3::from_fn(|_, _| 0.4 * numbers.next().unwrap_or_default());
@@ -428,9 +504,9 @@ mod tests {
                 continue;
             };
             let origin = Vector3::zeros();
-            let (spaces, count) = region.linearised(&origin);
+            let spaces: Vec<_> = region.conditions(origin).map(|c| c.linearised(&origin)).collect();
             // n · x ≤ h of the motion is (D⁻ᵀ n) · y ≤ h of what it causes.
-            let sets: Vec<_> = spaces[..count]
+            let sets: Vec<_> = spaces
                 .iter()
                 .map(|space| {
                     let n = inverse.tr_mul(&space.n);
@@ -467,5 +543,46 @@ mod tests {
         region.cut(4, cut(0.3));
         let found = region.nearest(&Vector3::x());
         assert!((found - Vector3::new(0.3, 0.0, 0.0)).norm() < 1e-15, "{found}");
+    }
+
+    /// Shoulders of arms with random elbows and wrists are within the ring, those a little further are not.
+    #[test]
+    fn a_ring_is_where_the_shoulder_of_an_arm_can_be() {
+        let numbers = &mut numbers(9);
+        let ring = Ring {
+            arm: Vector3::new(0.0, 0.2, 0.3),
+            wrist: Vector3::new(0.3, 0.1, 0.2),
+            axis: Vector3::new(1.0, 2.0, -1.0).normalize(),
+            forearm_m: 0.25,
+            upper_arm_m: 0.2,
+        };
+        let mut region = Region::new(1);
+        region.add_ring(ring);
+        let side = any_across(&ring.axis);
+        for _ in 0..1000 {
+            let turn = 4.0 * numbers.next().unwrap_or_default();
+            let forearm = side * turn.cos() + ring.axis.cross(&side) * turn.sin();
+            let elbow = ring.wrist + forearm * ring.forearm_m;
+            let shoulder = elbow + vector(numbers).normalize() * ring.upper_arm_m;
+            assert!(region.contains(&(shoulder - ring.arm)));
+            let beyond = elbow + forearm * (ring.upper_arm_m + 1e-9) - ring.arm;
+            assert!(!region.contains(&beyond));
+            let target = beyond + vector(numbers) * 0.1;
+            let found = region.nearest(&target);
+            let [nearest, farthest] = ring.nearest_and_farthest(&found);
+            assert!((found - nearest).norm() < ring.upper_arm_m + 1e-9);
+            assert!((found - farthest).norm() > ring.upper_arm_m - 1e-9);
+            // Beyond the circle's nearest point the foot of the target is on the line to that point.
+            let [nearest, _] = ring.nearest_and_farthest(&target);
+            let away = target - nearest;
+            if away.norm() > ring.upper_arm_m {
+                let expected = nearest + away * (ring.upper_arm_m / away.norm());
+                assert!(
+                    (found - expected).norm() < 1e-9,
+                    "{:e}",
+                    (found - expected).norm()
+                );
+            }
+        }
     }
 }

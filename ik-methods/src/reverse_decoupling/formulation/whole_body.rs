@@ -25,6 +25,15 @@ pub(super) struct Candidate {
     pub(super) merit: Merit,
 }
 
+/// What joints do that a singularity leaves free.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Free {
+    /// They rest.
+    Rests,
+    /// They rest, unless another joint of the limb would leave its interval.
+    GivesWay,
+}
+
 /// How good a candidate is.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Merit {
@@ -132,7 +141,7 @@ impl<'a> Step<'a> {
                 Waist::Prescribed(_, place) => place.point(self.x) - self.rotation * place.in_body.coords,
                 Waist::Fixed | Waist::Balanced(..) => Vector3::zeros(),
             };
-            self.limbs(origin, &work.targets, &mut work.best);
+            self.limbs(origin, &work.targets, Free::GivesWay, &mut work.best);
             return conclude(&work.best.merit);
         };
         self.balance(&centre, work, eval)
@@ -171,7 +180,13 @@ impl<'a> Step<'a> {
     }
 
     /// Solves all limbs with the root at `origin`.
-    pub(super) fn limbs(&self, origin: Vector3<f64>, targets: &[Isometry3<f64>], out: &mut Candidate) {
+    pub(super) fn limbs(
+        &self,
+        origin: Vector3<f64>,
+        targets: &[Isometry3<f64>],
+        free: Free,
+        out: &mut Candidate,
+    ) {
         out.origin = origin;
         out.merit = Merit::default();
         out.q.copy_from_slice(self.step.q_prev);
@@ -184,50 +199,129 @@ impl<'a> Step<'a> {
                 *to = if same_side { *c } else { -c };
             }
         }
+        // Joints that rest still move into their intervals, and the centre of mass with them.
+        let (root_nq, root_nv) = (self.robot.root().nq(), self.robot.root().nv());
+        let Bounds { lo, hi, .. } = self.step.bounds;
+        for (i, q) in out.q[root_nq..].iter_mut().enumerate() {
+            *q += 0.0_f64.clamp(lo[root_nv + i], hi[root_nv + i]);
+        }
         let root = Isometry3::from_parts(Translation3::from(origin), self.rotation);
         for (plan, target) in self.plan.limbs.iter().zip(targets) {
-            self.limb(plan, &root.inv_mul(target), out);
+            self.limb(plan, &root.inv_mul(target), free, out);
         }
     }
 
     /// Solves one limb for the pose of its last body in the root.
-    fn limb(&self, plan: &LimbPlan, pose: &Isometry3<f64>, out: &mut Candidate) {
+    fn limb(&self, plan: &LimbPlan, pose: &Isometry3<f64>, free: Free, out: &mut Candidate) {
         let root = self.robot.root();
-        let (q_prev, bounds) = (&self.step.q_prev[root.nq()..], &self.step.bounds);
-        let mut before = [0.0; 6];
+        let joints = plan.coordinates.len();
+        let mut before = [0.0; MOST_JOINTS];
         for (to, c) in before.iter_mut().zip(&plan.coordinates) {
-            *to = q_prev[*c];
+            *to = self.step.q_prev[root.nq() + c];
         }
-        let before = &before[..plan.coordinates.len()];
-        let (mut least, mut chosen) = ((f64::INFINITY, f64::INFINITY), (0.0, 0));
-        let joints = &mut out.q[root.nq()..];
-        let solved = plan.limb.for_each_solution(pose, before, |solution, _| {
-            let (mut moves, mut outside, mut most) = ([0.0; 6], (0.0, 0), 0.0_f64);
-            for (((to, q), before), c) in moves.iter_mut().zip(solution).zip(before).zip(&plan.coordinates) {
-                let (lo, hi) = (bounds.lo[root.nv() + c], bounds.hi[root.nv() + c]);
-                let (motion, excess) = turned_inside(wrap(q - before), lo, hi);
-                *to = motion;
-                most = most.max(motion.abs());
-                if excess > outside.0 {
-                    outside = (excess, *c);
-                }
-            }
-            let rank = (outside.0.max(OUTSIDE_RAD), most);
-            if rank < least {
-                (least, chosen) = (rank, outside);
-                for ((c, before), motion) in plan.coordinates.iter().zip(before).zip(moves) {
-                    joints[*c] = before + motion;
-                }
-            }
-        });
+        let before = &before[..joints];
+        let mut nearest = Nearest::default();
+        let solved = self.solutions(plan, pose, before, before, &mut nearest);
+        if solved.is_ok() && nearest.outside.0 > OUTSIDE_RAD && matches!(free, Free::GivesWay) {
+            self.give_way(plan, pose, before, &mut nearest);
+        }
         match solved {
-            Ok(_) if chosen.0 > out.merit.outside.0 => out.merit.outside = chosen,
-            Ok(_) => {}
+            Ok(_) => {
+                for ((c, before), motion) in plan.coordinates.iter().zip(before).zip(nearest.motion) {
+                    out.q[root.nq() + c] = before + motion;
+                }
+                if nearest.outside.0 > out.merit.outside.0 {
+                    out.merit.outside = nearest.outside;
+                }
+            }
             Err(unsolved) if plan.is_hard => {
-                out.merit.missing_m = out.merit.missing_m.max(missing(&unsolved))
+                out.merit.missing_m = out.merit.missing_m.max(missing(&unsolved));
             }
             Err(unsolved) => out.merit.left_m = out.merit.left_m.max(missing(&unsolved)),
         }
+    }
+
+    /// Solutions in which one joint that a singularity leaves free has moved by as much as another one is outside. Any joint that
+    /// rests may be such a one.
+    fn give_way(&self, plan: &LimbPlan, pose: &Isometry3<f64>, before: &[f64], nearest: &mut Nearest) {
+        let Nearest {
+            motion,
+            outside: (excess, _),
+            ..
+        } = *nearest;
+        for free in (0..before.len()).filter(|&k| motion[k] == 0.0) {
+            for sign in [1.0, -1.0] {
+                let mut moved = [0.0; MOST_JOINTS];
+                moved[..before.len()].copy_from_slice(before);
+                moved[free] += sign * excess;
+                let held = &moved[..before.len()];
+                if self.solutions(plan, pose, before, held, nearest).is_err() {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Compares all solutions, free joints held at `held`, with the nearest to `before` so far.
+    fn solutions(
+        &self,
+        plan: &LimbPlan,
+        pose: &Isometry3<f64>,
+        before: &[f64],
+        held: &[f64],
+        nearest: &mut Nearest,
+    ) -> Result<usize, Unsolved> {
+        let first = self.robot.root().nv();
+        let Bounds { lo, hi, .. } = self.step.bounds;
+        plan.limb.for_each_solution(pose, held, |solution, _| {
+            let mut found = Nearest {
+                most: 0.0,
+                ..Nearest::default()
+            };
+            found.outside.0 = 0.0;
+            for (k, c) in plan.coordinates.iter().enumerate() {
+                let direct = wrap(solution[k] - before[k]);
+                let (motion, excess) = turned_inside(direct, lo[first + c], hi[first + c]);
+                found.motion[k] = motion;
+                found.most = found.most.max(motion.abs());
+                if excess > found.outside.0 {
+                    found.outside = (excess, *c);
+                }
+            }
+            if found.rank() < nearest.rank() {
+                *nearest = found;
+            }
+        })
+    }
+}
+
+/// Most joints of a limb.
+const MOST_JOINTS: usize = 6;
+
+/// The solution of a limb that is least outside its intervals, of those inside the one whose largest motion is least.
+#[derive(Clone, Copy, Debug)]
+struct Nearest {
+    /// Motion of each joint from q⁻ (rad).
+    motion: [f64; MOST_JOINTS],
+    /// The largest (rad).
+    most: f64,
+    /// Greatest excess over an interval (rad), and the joint coordinate.
+    outside: (f64, usize),
+}
+
+impl Default for Nearest {
+    fn default() -> Self {
+        Self {
+            motion: [0.0; MOST_JOINTS],
+            most: f64::INFINITY,
+            outside: (f64::INFINITY, 0),
+        }
+    }
+}
+
+impl Nearest {
+    fn rank(&self) -> (f64, f64) {
+        (self.outside.0.max(OUTSIDE_RAD), self.most)
     }
 }
 
@@ -287,5 +381,22 @@ pub(super) fn root_pose(robot: &Robot, q: &[f64]) -> Isometry3<f64> {
                 UnitQuaternion::new_unchecked(turn),
             )
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_motion_takes_the_turn_that_is_inside() {
+        // A joint at 3.1 rad that may go on to 7: the direction of −3 is half a turn less or more away.
+        assert_eq!(turned_inside(0.2, -1.0, 1.0), (0.2, 0.0));
+        let (motion, excess) = turned_inside(-3.0, 0.0, 4.0);
+        assert!((motion - (TAU - 3.0)).abs() < 1e-15 && excess == 0.0);
+        let (motion, excess) = turned_inside(3.0, -4.0, -1.0);
+        assert!((motion - (3.0 - TAU)).abs() < 1e-15 && excess == 0.0);
+        let (motion, excess) = turned_inside(0.5, -0.1, 0.1);
+        assert!((motion - 0.5).abs() < 1e-15 && (excess - 0.4).abs() < 1e-15);
     }
 }

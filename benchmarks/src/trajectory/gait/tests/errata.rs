@@ -3,6 +3,7 @@
 //! Times in the printed foot equations are read 2j where the source prints j; why is the first test.
 
 use super::{build, text};
+use crate::trajectory::Locomotion;
 use crate::trajectory::gait::{Gait, Walk, rows};
 use crate::trajectory::spline::{CubicSpline, Curve};
 use crate::trajectory::{Support, Trajectory};
@@ -26,9 +27,9 @@ fn spline(knots: &[(f64, f64)]) -> Curve {
 /// The message of the reach check between two instants, if it refuses the walk.
 fn refusal(walk: Walk, from_s: f64, to_s: f64) -> Option<String> {
     let mut trajectory = trajectory();
-    let mut gait: Gait = trajectory.gait.take().unwrap();
+    let mut gait: Gait = trajectory.gait().unwrap().clone();
     gait.rows = rows(&gait.spec, &walk, &gait.waist, &gait.legs, &gait.arms);
-    trajectory.gait = Some(gait.clone());
+    trajectory.locomotion = Some(Locomotion::Gait(Box::new(gait.clone())));
     let count = ((to_s - from_s) / 0.01).round() as u32;
     let times = (0..=count).map(|k| from_s + 0.01 * f64::from(k));
     gait.check_reach(&trajectory, times, "printed", "gait")
