@@ -289,3 +289,42 @@ fn centre_of_mass_jacobian<const FMA: bool>(robot: &Robot, page: &mut Page) {
 pub(crate) fn root_quaternion(q: &[f64]) -> UnitQuaternion<f64> {
     UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(q[6], q[3], q[4], q[5]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::configuration::integrate;
+    use crate::robot::{EMBEDDED, embedded};
+
+    /// Both variants of the tree pass, whatever this process has chosen; on a machine without the instructions one of them twice.
+    #[test]
+    fn variants_of_the_tree_pass_agree() {
+        for entry in EMBEDDED {
+            let robot = embedded(entry.id).expect("embedded robots are sound");
+            for start in 0..50 {
+                let number = |i: usize| 3.0 * ((start * 97 + i) as f64 * 0.618_033_988_749_895).fract() - 1.5;
+                let step: Vec<f64> = (0..robot.nv()).map(number).collect();
+                let q = integrate(&robot, &robot.neutral(), &step);
+                let (mut chosen, mut portable) = (Page::new(&robot), Page::new(&robot));
+                forward(&robot, &q, &mut chosen);
+                TreePass {
+                    robot: &robot,
+                    q: &q,
+                    page: &mut portable,
+                }
+                .run::<false>();
+                let lanes = |page: &Page| {
+                    let poses = page
+                        .bodies
+                        .iter()
+                        .flat_map(|pose| [pose.x, pose.y, pose.z, pose.origin]);
+                    let columns = page.com_jacobian.iter().copied().chain([page.com]);
+                    poses.chain(columns).flatten().collect::<Vec<_>>()
+                };
+                for (a, b) in lanes(&chosen).iter().zip(lanes(&portable)) {
+                    assert!((a - b).abs() <= 1e-13 * b.abs().max(1.0), "{}: {a} {b}", entry.id);
+                }
+            }
+        }
+    }
+}
