@@ -11,6 +11,7 @@ pub mod configuration;
 pub mod driver;
 pub mod evaluator;
 pub mod formulation;
+pub mod instructions;
 pub mod kinematics;
 pub mod objective;
 pub mod problem;

@@ -17,6 +17,7 @@ pub mod second_order;
 mod sin_cos;
 pub mod successive;
 
+use crate::instructions::{self, Kernel};
 use crate::robot::{FrameId, Motion, Robot, Root};
 use crate::spatial::lane::{self, AXES, Lane, ZERO};
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
@@ -32,19 +33,28 @@ pub(crate) struct BodyPose {
 
 impl BodyPose {
     #[inline(always)]
-    fn rotate(&self, x: f64, y: f64, z: f64) -> Lane {
-        lane::add_scaled(lane::add_scaled(lane::scale(self.x, x), self.y, y), self.z, z)
+    fn rotate<const FMA: bool>(&self, x: f64, y: f64, z: f64) -> Lane {
+        let xy = lane::add_times::<FMA>(lane::scale(self.x, x), self.y, y);
+        lane::add_times::<FMA>(xy, self.z, z)
     }
 
     /// World coordinates of a point given in body coordinates.
     #[inline(always)]
     pub(crate) fn point(&self, p: &Vector3<f64>) -> Lane {
-        lane::add(self.origin, self.rotate(p.x, p.y, p.z))
+        self.point_at::<false>(p)
+    }
+
+    /// [`Self::point`], products fused or not.
+    #[inline(always)]
+    pub(crate) fn point_at<const FMA: bool>(&self, p: &Vector3<f64>) -> Lane {
+        let x = lane::add_times::<FMA>(self.origin, self.x, p.x);
+        let xy = lane::add_times::<FMA>(x, self.y, p.y);
+        lane::add_times::<FMA>(xy, self.z, p.z)
     }
 
     /// World rotation matrix of a frame whose rotation in the body is `r`.
     pub(crate) fn rotation(&self, r: &Matrix3<f64>) -> Matrix3<f64> {
-        let column = |k: usize| lane::to_vector(self.rotate(r[(0, k)], r[(1, k)], r[(2, k)]));
+        let column = |k: usize| lane::to_vector(self.rotate::<false>(r[(0, k)], r[(1, k)], r[(2, k)]));
         Matrix3::from_columns(&[column(0), column(1), column(2)])
     }
 }
@@ -139,11 +149,27 @@ impl Page {
 
 /// Fills `page` for the configuration `q` (length `robot.nq()`, unit root quaternion).
 pub fn forward(robot: &Robot, q: &[f64], page: &mut Page) {
-    poses(robot, q, page);
-    mass_moments(robot, page);
-    centre_of_mass_jacobian(robot, page);
+    instructions::run(TreePass { robot, q, page });
 }
 
+struct TreePass<'a> {
+    robot: &'a Robot,
+    q: &'a [f64],
+    page: &'a mut Page,
+}
+
+impl Kernel for TreePass<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<const FMA: bool>(self) {
+        poses::<FMA>(self.robot, self.q, self.page);
+        mass_moments::<FMA>(self.robot, self.page);
+        centre_of_mass_jacobian::<FMA>(self.robot, self.page);
+    }
+}
+
+#[inline(always)]
 fn root_pose(robot: &Robot, q: &[f64]) -> BodyPose {
     match robot.root() {
         Root::Fixed => BodyPose {
@@ -179,26 +205,27 @@ fn root_pose(robot: &Robot, q: &[f64]) -> BodyPose {
     }
 }
 
-fn poses(robot: &Robot, q: &[f64], page: &mut Page) {
+#[inline(always)]
+fn poses<const FMA: bool>(robot: &Robot, q: &[f64], page: &mut Page) {
     let coordinates = &q[robot.root().nq()..];
     for (joint, value) in robot.aligned.iter().zip(&mut page.value) {
         *value = joint.multiplier * coordinates[joint.coordinate] + joint.offset;
     }
-    sin_cos::sin_cos_into(&page.value, &mut page.sine, &mut page.cosine);
+    sin_cos::sin_cos_into::<FMA>(&page.value, &mut page.sine, &mut page.cosine);
     page.bodies[0] = root_pose(robot, q);
     for (i, joint) in robot.aligned.iter().enumerate() {
         let parent = page.bodies[joint.parent];
         let r = &joint.r_parent_joint;
-        let x = parent.rotate(r[(0, 0)], r[(1, 0)], r[(2, 0)]);
-        let y = parent.rotate(r[(0, 1)], r[(1, 1)], r[(2, 1)]);
-        let z = parent.rotate(r[(0, 2)], r[(1, 2)], r[(2, 2)]);
-        let origin = parent.point(&joint.p_parent_joint);
+        let x = parent.rotate::<FMA>(r[(0, 0)], r[(1, 0)], r[(2, 0)]);
+        let y = parent.rotate::<FMA>(r[(0, 1)], r[(1, 1)], r[(2, 1)]);
+        let z = parent.rotate::<FMA>(r[(0, 2)], r[(1, 2)], r[(2, 2)]);
+        let origin = parent.point_at::<FMA>(&joint.p_parent_joint);
         page.bodies[i + 1] = match joint.motion {
             Motion::Revolute => {
                 let (s, c) = (page.sine[i], page.cosine[i]);
                 BodyPose {
-                    x: lane::add_scaled(lane::scale(x, c), y, s),
-                    y: lane::add_scaled(lane::scale(y, c), x, -s),
+                    x: lane::add_times::<FMA>(lane::scale(x, c), y, s),
+                    y: lane::add_times::<FMA>(lane::scale(y, c), x, -s),
                     z,
                     origin,
                 }
@@ -207,20 +234,21 @@ fn poses(robot: &Robot, q: &[f64], page: &mut Page) {
                 x,
                 y,
                 z,
-                origin: lane::add_scaled(origin, z, page.value[i]),
+                origin: lane::add_times::<FMA>(origin, z, page.value[i]),
             },
         };
     }
 }
 
-fn mass_moments(robot: &Robot, page: &mut Page) {
+#[inline(always)]
+fn mass_moments<const FMA: bool>(robot: &Robot, page: &mut Page) {
     for ((pose, (mass, com)), moment) in page
         .bodies
         .iter()
         .zip(&robot.aligned_bodies)
         .zip(&mut page.moments)
     {
-        *moment = lane::scale(pose.point(com), *mass);
+        *moment = lane::scale(pose.point_at::<FMA>(com), *mass);
     }
     if robot.root() == Root::Fixed {
         page.moments[0] = ZERO;
@@ -231,7 +259,8 @@ fn mass_moments(robot: &Robot, page: &mut Page) {
     page.com = lane::scale(page.moments[0], page.inverse_mass);
 }
 
-fn centre_of_mass_jacobian(robot: &Robot, page: &mut Page) {
+#[inline(always)]
+fn centre_of_mass_jacobian<const FMA: bool>(robot: &Robot, page: &mut Page) {
     page.com_jacobian.fill(ZERO);
     if robot.root() == Root::Floating {
         let arm = lane::sub(page.com, page.bodies[0].origin);
@@ -245,18 +274,57 @@ fn centre_of_mass_jacobian(robot: &Robot, page: &mut Page) {
         let pose = &page.bodies[i + 1];
         let column = match joint.motion {
             Motion::Revolute => {
-                let arm = lane::add_scaled(page.moments[i + 1], pose.origin, -page.subtree_mass[i + 1]);
+                let arm = lane::add_times::<FMA>(page.moments[i + 1], pose.origin, -page.subtree_mass[i + 1]);
                 lane::cross(pose.z, arm)
             }
             Motion::Prismatic => lane::scale(pose.z, page.subtree_mass[i + 1]),
         };
         let v = first + joint.coordinate;
         page.com_jacobian[v] =
-            lane::add_scaled(page.com_jacobian[v], column, joint.multiplier * page.inverse_mass);
+            lane::add_times::<FMA>(page.com_jacobian[v], column, joint.multiplier * page.inverse_mass);
     }
 }
 
 /// Unit quaternion stored in `q` of a floating root.
 pub(crate) fn root_quaternion(q: &[f64]) -> UnitQuaternion<f64> {
     UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(q[6], q[3], q[4], q[5]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::configuration::integrate;
+    use crate::robot::{EMBEDDED, embedded};
+
+    /// Both variants of the tree pass, whatever this process has chosen; on a machine without the instructions one of them twice.
+    #[test]
+    fn variants_of_the_tree_pass_agree() {
+        for entry in EMBEDDED {
+            let robot = embedded(entry.id).expect("embedded robots are sound");
+            for start in 0..50 {
+                let number = |i: usize| 3.0 * ((start * 97 + i) as f64 * 0.618_033_988_749_895).fract() - 1.5;
+                let step: Vec<f64> = (0..robot.nv()).map(number).collect();
+                let q = integrate(&robot, &robot.neutral(), &step);
+                let (mut chosen, mut portable) = (Page::new(&robot), Page::new(&robot));
+                forward(&robot, &q, &mut chosen);
+                TreePass {
+                    robot: &robot,
+                    q: &q,
+                    page: &mut portable,
+                }
+                .run::<false>();
+                let lanes = |page: &Page| {
+                    let poses = page
+                        .bodies
+                        .iter()
+                        .flat_map(|pose| [pose.x, pose.y, pose.z, pose.origin]);
+                    let columns = page.com_jacobian.iter().copied().chain([page.com]);
+                    poses.chain(columns).flatten().collect::<Vec<_>>()
+                };
+                for (a, b) in lanes(&chosen).iter().zip(lanes(&portable)) {
+                    assert!((a - b).abs() <= 1e-13 * b.abs().max(1.0), "{}: {a} {b}", entry.id);
+                }
+            }
+        }
+    }
 }

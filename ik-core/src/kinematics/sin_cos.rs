@@ -33,21 +33,31 @@ const COSINE: [f64; 6] = [
     -1.135_964_755_778_819_5e-11,
 ];
 
+use crate::spatial::lane::mul_add;
+
 /// Writes `sine[i] = sin(angle[i])` and `cosine[i] = cos(angle[i])`; the three slices have equal length.
-pub(crate) fn sin_cos_into(angle: &[f64], sine: &mut [f64], cosine: &mut [f64]) {
+#[inline(always)]
+pub(crate) fn sin_cos_into<const FMA: bool>(angle: &[f64], sine: &mut [f64], cosine: &mut [f64]) {
     let mut largest = 0.0f64;
     for ((&x, s), c) in angle.iter().zip(sine.iter_mut()).zip(cosine.iter_mut()) {
         largest = largest.max(x.abs());
-        let shifted = x * std::f64::consts::FRAC_2_PI + ROUNDING;
+        let shifted = mul_add::<FMA>(x, std::f64::consts::FRAC_2_PI, ROUNDING);
         let quadrant = shifted.to_bits();
         let n = shifted - ROUNDING;
-        let r = ((x - n * HALF_PI[0]) - n * HALF_PI[1]) - n * HALF_PI[2];
+        let reduced = |r: f64, part: f64| mul_add::<FMA>(-n, part, r);
+        let r = reduced(reduced(reduced(x, HALF_PI[0]), HALF_PI[1]), HALF_PI[2]);
         let z = r * r;
-        let poly = SINE[1] + z * (SINE[2] + z * (SINE[3] + z * (SINE[4] + z * SINE[5])));
-        let sin_r = r + r * z * (SINE[0] + z * poly);
-        let poly =
-            COSINE[0] + z * (COSINE[1] + z * (COSINE[2] + z * (COSINE[3] + z * (COSINE[4] + z * COSINE[5]))));
-        let cos_r = 1.0 - (0.5 * z - z * z * poly);
+        let poly = |first: f64, rest: &[f64]| {
+            rest.iter()
+                .fold(first, |sum, coefficient| mul_add::<FMA>(sum, z, *coefficient))
+        };
+        let sin_poly = poly(SINE[5], &[SINE[4], SINE[3], SINE[2], SINE[1], SINE[0]]);
+        let sin_r = mul_add::<FMA>(r * z, sin_poly, r);
+        let cos_poly = poly(
+            COSINE[5],
+            &[COSINE[4], COSINE[3], COSINE[2], COSINE[1], COSINE[0]],
+        );
+        let cos_r = 1.0 - mul_add::<FMA>(-z * z, cos_poly, 0.5 * z);
         // Odd quadrants swap the two; sin changes sign in quadrants 2, 3 and cos in 1, 2.
         let swap = (quadrant & 1).wrapping_neg();
         let (sin_bits, cos_bits) = (sin_r.to_bits(), cos_r.to_bits());
@@ -72,8 +82,19 @@ mod tests {
     fn check(angles: &[f64]) {
         let mut s = vec![0.0; angles.len()];
         let mut c = vec![0.0; angles.len()];
-        sin_cos_into(angles, &mut s, &mut c);
-        for ((x, s), c) in angles.iter().zip(&s).zip(&c) {
+        // Fused products work on any machine, slowly where it lacks the instruction.
+        for fused in [false, true] {
+            if fused {
+                sin_cos_into::<true>(angles, &mut s, &mut c);
+            } else {
+                sin_cos_into::<false>(angles, &mut s, &mut c);
+            }
+            compare(angles, &s, &c);
+        }
+    }
+
+    fn compare(angles: &[f64], s: &[f64], c: &[f64]) {
+        for ((x, s), c) in angles.iter().zip(s).zip(c) {
             assert!(
                 (s - x.sin()).abs() <= 2.3e-16 && (c - x.cos()).abs() <= 2.3e-16,
                 "at {x}: {s} {c}"
@@ -95,7 +116,7 @@ mod tests {
         check(&(-40..40).map(|k| f64::from(k) * quarter).collect::<Vec<_>>());
         check(&[0.0, -0.0, 1e-300, 9.9e5, 1e7, -1e15]);
         let (mut s, mut c) = ([0.0; 3], [0.0; 3]);
-        sin_cos_into(&[f64::NAN, f64::INFINITY, 0.5], &mut s, &mut c);
+        sin_cos_into::<false>(&[f64::NAN, f64::INFINITY, 0.5], &mut s, &mut c);
         assert!(s[0].is_nan() && c[0].is_nan() && s[1].is_nan() && (s[2] - 0.5f64.sin()).abs() < 1e-15);
     }
 }

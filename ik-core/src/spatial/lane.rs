@@ -25,6 +25,24 @@ pub(crate) fn scale(a: Lane, s: f64) -> Lane {
     [a[0] * s, a[1] * s, a[2] * s, a[3] * s]
 }
 
+/// `a b + c`, fused or not.
+#[inline(always)]
+pub(crate) fn mul_add<const FMA: bool>(a: f64, b: f64, c: f64) -> f64 {
+    // Without the instruction a fused product is a slow call.
+    if FMA { a.mul_add(b, c) } else { a * b + c }
+}
+
+/// `a + s b`, fused or not.
+#[inline(always)]
+pub(crate) fn add_times<const FMA: bool>(a: Lane, b: Lane, s: f64) -> Lane {
+    [
+        mul_add::<FMA>(s, b[0], a[0]),
+        mul_add::<FMA>(s, b[1], a[1]),
+        mul_add::<FMA>(s, b[2], a[2]),
+        mul_add::<FMA>(s, b[3], a[3]),
+    ]
+}
+
 /// `a + s b`.
 #[inline(always)]
 pub(crate) fn add_scaled(a: Lane, b: Lane, s: f64) -> Lane {
