@@ -246,3 +246,27 @@ fn objectives_of_one_kind_are_told_apart() {
     });
     assert!((fourfold.0 / once.0 - 4.0).abs() < 1e-12 && (fourfold.1 / once.1 - 4.0).abs() < 1e-12);
 }
+
+/// Least margins again, from the trace: Melson's feet point along x, so one sole is its own bounding box.
+#[test]
+fn the_least_margins_are_those_of_the_trace() {
+    let walked = Walked::new("melson/walk", "S1", "clik");
+    let (trace, quality) = (walked.trace(), walked.quality());
+    let column = |name: &str| trace.column(name).unwrap();
+    let (t, masses) = (column("t"), column("zmp_margin"));
+    let (x, y) = (column("cart_zmp_x"), column("cart_zmp_y"));
+    let [x_min, x_max, y_min, y_max] =
+        ["support_x_min", "support_x_max", "support_y_min", "support_y_max"].map(column);
+    let counted: Vec<usize> = (2..t.len() - 2).filter(|&k| t[k] > 0.2).collect();
+    let least = counted.iter().map(|&k| masses[k]).fold(f64::INFINITY, f64::min);
+    assert_eq!(quality.settled_zmp_margin_min_m, Some(least));
+    let narrow = y_max[t.len() / 4] - y_min[t.len() / 4];
+    let alone = counted.iter().filter(|&&k| y_max[k] - y_min[k] < narrow + 1e-3);
+    let to_border = |&k: &usize| {
+        let across = (x[k] - x_min[k]).min(x_max[k] - x[k]);
+        across.min(y[k] - y_min[k]).min(y_max[k] - y[k])
+    };
+    let least = alone.map(to_border).fold(f64::INFINITY, f64::min);
+    let judged = quality.settled_cart_zmp_margin_min_m.unwrap();
+    assert!((judged - least).abs() < 1e-9, "{judged} {least}");
+}

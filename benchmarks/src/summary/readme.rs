@@ -79,7 +79,7 @@ const WALK_HEADER: [&str; 12] = [
     "Melson S3: hard max (mm)",
     "Hubo walk: hard max (mm)",
     "Bioloid walk: soft rms (mm)",
-    "Bioloid walk: ZMP error rms (mm)",
+    "Bioloid walk: cart ZMP error rms (mm)",
     "Melson S3: median step (µs)",
     "×ik1",
 ];

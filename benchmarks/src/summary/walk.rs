@@ -12,8 +12,8 @@ const HEADER: [&str; 12] = [
     "Στ² (N²m²)",
     "drift, mean (rad/cycle)",
     "drift, last (rad/cycle)",
-    "ZMP error rms (mm)",
-    "ZMP error max (mm)",
+    "cart ZMP error rms (mm)",
+    "cart ZMP error max (mm)",
     "ZMP margin (mm)",
     "cart ZMP margin (mm)",
 ];

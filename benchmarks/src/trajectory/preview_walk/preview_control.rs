@@ -21,7 +21,7 @@
 //!
 //! Deviation: Kajita's eq. (12) is the sum of this over k, `u_k = −G_i Σe − G_x x_k − Σ G_i^d p_ref,k+i`. Both are equal if the
 //! reference rests for the first N samples. If it moves at once the sum, which then counts a past that never was, throws the
-//! zero-moment point off by 35 mm in the first period of a walk of the small humanoid, the increments by 7 mm; and the sum
+//! zero-moment point off by up to 35 mm at the beginning of a walk of the small humanoid, the increments by 7 mm; and the sum
 //! depends on where the origin is, because N gains do not add up to `−G_x` of the position.
 
 use ik_core::kinematics::gravity::GRAVITY_M_S2;
