@@ -160,7 +160,7 @@ fn published(folder: &str) -> Vec<Row> {
 
 #[test]
 fn the_published_rows_give_the_tables_of_the_readme() {
-    let rows = published("2026-11-22-walks");
+    let rows = published("2026-11-22-humanoids");
     let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md");
     let readme = std::fs::read_to_string(readme).unwrap();
     assert!(readme.contains(&readme_table(&rows)), "{}", readme_table(&rows));
