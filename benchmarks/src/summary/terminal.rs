@@ -1,8 +1,10 @@
 //! The table of the terminal.
 
+use super::walk::{TERMINAL_LEGEND, terminal_walk_table};
 use super::{NONE, hard_max, number, seconds, suites, yes_no};
 use crate::figures::labels::{Labelled, by_method, labelled, numbered};
 use crate::records::{Metrics, Row, TerminationRecord};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 /// Columns of the terminal.
@@ -50,11 +52,12 @@ boundary was given. ok: survived; decl.: declined, for the reason given.
 pub fn terminal_table(rows: &[Row]) -> String {
     let runs = labelled(rows);
     let mut text = String::new();
+    let mut walks = false;
     for suite in suites(&runs) {
         let of_suite: Vec<&Labelled<'_>> = runs.iter().filter(|r| r.row.suite == suite).collect();
         text.push_str(&format!("\n{suite}\n"));
         let header: Vec<String> = TERMINAL.iter().map(|c| c.0.to_owned()).collect();
-        push_line(&mut text, &header);
+        push_line(&mut text, &header, &TERMINAL);
         let mut notes = Vec::new();
         for line in terminal_lines(&of_suite) {
             let mut line_cells = vec![
@@ -63,15 +66,54 @@ pub fn terminal_table(rows: &[Row]) -> String {
                 line.n,
             ];
             line_cells.extend(line.values);
-            push_line(&mut text, &line_cells);
+            push_line(&mut text, &line_cells, &TERMINAL);
         }
         for (i, note) in notes.iter().enumerate() {
             text.push_str(&format!("[{}] {note}\n", i + 1));
         }
         text.push_str(&refusals(&of_suite));
+        text.push_str(&endings(&of_suite));
+        if let Some(table) = terminal_walk_table(&of_suite) {
+            text.push_str(&format!("\n{table}"));
+            walks = true;
+        }
     }
     if !text.is_empty() {
         text.push_str(LEGEND);
+    }
+    if walks {
+        text.push_str(TERMINAL_LEGEND);
+    }
+    text
+}
+
+/// Endings of steps that are in order.
+const IN_ORDER: [&str; 3] = ["converged", "stepped", "budget"];
+
+/// How many steps of a method ended otherwise than they should, over all scenarios.
+fn endings(runs: &[&Labelled<'_>]) -> String {
+    let mut text = String::new();
+    for group in by_method(runs.iter().copied()) {
+        let (mut total, mut words) = (0, BTreeMap::new());
+        for run in &group {
+            if let TerminationRecord::Completed { steps } = &run.row.termination {
+                for (word, count) in steps {
+                    total += count;
+                    if !IN_ORDER.contains(&word.as_str()) {
+                        *words.entry(word.as_str()).or_insert(0) += count;
+                    }
+                }
+            }
+        }
+        if let Some(first) = group.first().filter(|_| !words.is_empty()) {
+            let n = first.n.map_or(String::new(), |n| format!(" n={n}"));
+            let words: Vec<_> = words
+                .iter()
+                .map(|(word, count)| format!("{count} {word}"))
+                .collect();
+            let words = words.join(", ");
+            text.push_str(&format!("{}{n}: of {total} steps {words}\n", first.label));
+        }
     }
     text
 }
@@ -90,9 +132,10 @@ fn refusals(runs: &[&Labelled<'_>]) -> String {
     lines.concat()
 }
 
-fn push_line(text: &mut String, cells: &[String]) {
+/// One line of a table whose first two columns are words; the others are numbers.
+pub(super) fn push_line(text: &mut String, cells: &[String], columns: &[(&str, usize)]) {
     let mut line = String::new();
-    for (index, (cell, (_, width))) in cells.iter().zip(TERMINAL).enumerate() {
+    for (index, (cell, &(_, width))) in cells.iter().zip(columns).enumerate() {
         let short = shortened(cell, width);
         let written = if index < 2 {
             write!(line, "{short:<width$} ")

@@ -72,6 +72,22 @@ fn the_terminal_table_fits_and_folds_large_suites() {
 }
 
 #[test]
+fn the_terminal_says_which_steps_ended_otherwise_than_they_should() {
+    let mut lost = row("closed-form", Some(15), "bioloid/gait", "gait-bounded");
+    let steps = [("converged", 790), ("outside-limits", 10)];
+    lost.termination = TerminationRecord::Completed {
+        steps: steps.map(|(word, count)| (word.to_owned(), count)).into(),
+    };
+    let rows = [row("ik1", None, "bioloid/gait", "gait-bounded"), lost];
+    let table = terminal_table(&rows);
+    assert!(
+        table.contains("closed-form n=15: of 800 steps 10 outside-limits\n"),
+        "{table}"
+    );
+    assert!(!table.contains("ik1: of"), "{table}");
+}
+
+#[test]
 fn the_summary_has_a_table_and_the_analysis_per_suite() {
     let mut lost = row("ik2", Some(3), "coman/lean", "D");
     lost.metrics.as_mut().unwrap().quality.survived = false;
@@ -121,6 +137,19 @@ fn a_suite_that_walks_has_a_second_table_and_a_line_in_the_readme() {
         "{text}"
     );
     assert!(!summary_markdown(&rows[..1], &BTreeMap::new()).contains("drift"));
+    let terminal = terminal_table(&rows);
+    let line = terminal
+        .lines()
+        .filter(|line| line.starts_with("S1 "))
+        .nth(1)
+        .unwrap();
+    assert!(line.contains("0.220") && line.contains("29.5"), "{terminal}");
+    assert!(
+        terminal
+            .lines()
+            .all(|line| line.chars().count() <= TERMINAL_WIDTH)
+    );
+    assert!(!terminal_table(&rows[..1]).contains("H_joint"));
     let readme = readme_table(&rows);
     assert!(
         readme.contains("| clik | – | 0.220, – | 2.75, – | – |"),
