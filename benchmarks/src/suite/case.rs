@@ -200,14 +200,17 @@ impl GainSpec {
             return Ok(());
         };
         not_negative("single_support_ramp_s", ramp_s)?;
-        if trajectory.walk().is_none() {
+        let wrong = |allowed: &str| {
             let field = format!("{field}.single_support_ramp_s");
-            return Err(InputError::value(
-                place,
-                &field,
-                ramp_s,
-                "nothing: the scenario has no walk",
-            ));
+            Err(InputError::value(place, &field, ramp_s, allowed))
+        };
+        let Some(walk) = trajectory.walk() else {
+            return wrong("nothing: the scenario has no walk");
+        };
+        // A longer ramp would never let the gain be reached.
+        let largest_s = 0.5 * walk.plan.shortest_swing_s();
+        if ramp_s > largest_s {
+            return wrong(&format!("at most {largest_s}, half the shortest swing"));
         }
         Ok(())
     }

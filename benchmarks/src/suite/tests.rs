@@ -516,3 +516,26 @@ fn robots_come_from_urdf_files_too() {
     );
     std::fs::remove_dir_all(&folder).unwrap();
 }
+
+#[test]
+fn a_ramp_of_gains_fits_into_a_swing() {
+    let (_, text) = EMBEDDED.iter().find(|(id, _)| *id == "melson/walk").unwrap();
+    let built = |ramp_s: &str| {
+        let text = text.replace(
+            "single_support_ramp_s = 0.3",
+            &format!("single_support_ramp_s = {ramp_s}"),
+        );
+        let suite = Suite::parse(&text, "mine.toml", std::path::Path::new(".")).unwrap();
+        Case::new(&suite, 0, &Variation::default()).map(|_| ())
+    };
+    built("1.5").unwrap();
+    let refused = built("1.51").unwrap_err().to_string();
+    for word in [
+        "mine.toml",
+        "gains[1].single_support_ramp_s = 1.51",
+        "at most 1.5",
+        "half the shortest swing",
+    ] {
+        assert!(refused.contains(word), "`{word}` is missing in: {refused}");
+    }
+}

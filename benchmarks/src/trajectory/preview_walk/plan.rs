@@ -128,6 +128,12 @@ impl Plan {
         }
     }
 
+    /// Duration of the shortest swing (s); infinite without a step.
+    pub fn shortest_swing_s(&self) -> f64 {
+        let swings = self.steps.iter().map(|step| step.touch_down_s - step.lift_off_s);
+        swings.fold(f64::INFINITY, f64::min)
+    }
+
     /// How far `t` (s) is inside a single support: 0 in double support, from 0 to 1 in `ramp_s` after lift-off and back
     /// before touchdown.
     pub fn single_support_ramp(&self, t: f64, ramp_s: f64) -> f64 {
