@@ -10,7 +10,15 @@
 use crate::kinematics::root_quaternion;
 use crate::robot::{Robot, Root};
 use crate::spatial::so3;
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Translation3, Vector3};
+
+/// Pose of the root body in the world; identity if it is fixed.
+pub fn root_pose(robot: &Robot, q: &[f64]) -> Isometry3<f64> {
+    match robot.root() {
+        Root::Fixed => Isometry3::identity(),
+        Root::Floating => Isometry3::from_parts(Translation3::new(q[0], q[1], q[2]), root_quaternion(q)),
+    }
+}
 
 /// Writes `q ⊕ dq`: positions and joints add, the root turns by `exp(dq_angular)` from the left; the quaternion is
 /// renormalised. `q` and `out` have length nq, `dq` length nv.

@@ -121,25 +121,9 @@ pub fn draw_all(dir: &Path, limits: &DrawnLimits) -> Result<Drawn, FigureError> 
     };
     let mut files = Vec::new();
     for (name, paint) in FIGURES {
-        let path = dir.join("figures").join(name);
-        match paint(&mut studio) {
-            Ok(svg) => {
-                write_atomically(&path, &svg)?;
-                files.push(path);
-            }
-            Err(Obstacle::NoData(reason)) => {
-                if has_runs {
-                    studio.notes.push(format!("{name} not drawn: {reason}"));
-                }
-                remove_stale(&path)?;
-            }
-            Err(Obstacle::Record(error)) => return Err(error.into()),
-            Err(Obstacle::Draw(reason)) => {
-                return Err(FigureError::Draw {
-                    figure: name.to_owned(),
-                    reason,
-                });
-            }
+        let painted = paint(&mut studio);
+        if let Some(missing) = store(dir, name, painted, &mut files)?.filter(|_| has_runs) {
+            studio.notes.push(missing);
         }
     }
     let mut drawn = Drawn {
@@ -148,6 +132,32 @@ pub fn draw_all(dir: &Path, limits: &DrawnLimits) -> Result<Drawn, FigureError> 
     };
     limbs::draw(dir, &mut drawn)?;
     Ok(drawn)
+}
+
+/// Writes a figure and adds its file to `files`; one without data is removed, and a note that says why is returned.
+fn store(
+    dir: &Path,
+    name: &str,
+    painted: Result<String, Obstacle>,
+    files: &mut Vec<PathBuf>,
+) -> Result<Option<String>, FigureError> {
+    let path = dir.join("figures").join(name);
+    match painted {
+        Ok(svg) => {
+            write_atomically(&path, &svg)?;
+            files.push(path);
+            Ok(None)
+        }
+        Err(Obstacle::NoData(reason)) => {
+            remove_stale(&path)?;
+            Ok(Some(format!("{name} not drawn: {reason}")))
+        }
+        Err(Obstacle::Record(error)) => Err(error.into()),
+        Err(Obstacle::Draw(reason)) => Err(FigureError::Draw {
+            figure: name.to_owned(),
+            reason,
+        }),
+    }
 }
 
 fn remove_stale(path: &Path) -> Result<(), RecordError> {

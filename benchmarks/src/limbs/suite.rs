@@ -3,6 +3,7 @@
 use crate::error::InputError;
 use crate::suite::{RobotSpec, check_id};
 use serde::{Deserialize, Serialize};
+use std::fmt::Display;
 use std::path::Path;
 
 /// A suite of closed-form limbs.
@@ -260,28 +261,17 @@ const MOST_CELLS: usize = 1_000;
 /// Poses of the off-axis grid are this far (degrees) at least from where indicators vanish: 0, 90, 180 and 270 degrees.
 const BESIDE_DEG: f64 = 1.0;
 
-fn count(source: &str, field: &str, value: usize, (least, most): (usize, usize)) -> Result<(), InputError> {
-    if (least..=most).contains(&value) {
+fn within<T: PartialOrd + Display>(
+    source: &str,
+    field: &str,
+    value: T,
+    (least, most): (T, T),
+) -> Result<(), InputError> {
+    if (&least..=&most).contains(&&value) {
         return Ok(());
     }
-    Err(InputError::value(
-        source,
-        field,
-        value,
-        &format!("{least} to {most}"),
-    ))
-}
-
-fn within(source: &str, field: &str, value: f64, (least, most): (f64, f64)) -> Result<(), InputError> {
-    if (least..=most).contains(&value) {
-        return Ok(());
-    }
-    Err(InputError::value(
-        source,
-        field,
-        value,
-        &format!("{least} to {most}"),
-    ))
+    let allowed = format!("{least} to {most}");
+    Err(InputError::value(source, field, value, &allowed))
 }
 
 /// Steps divide a full turn, in at least two parts and at most one per degree.
@@ -327,10 +317,10 @@ impl GridSpec {
         self.off_axis.check(source)?;
         for (name, counts) in [("full", &self.full), ("quick", &self.quick)] {
             let field = |of: &str| format!("study.grid.{name}.{of}");
-            count(source, &field("whole_up_to"), counts.whole_up_to, (1, MOST))?;
-            count(source, &field("sampled"), counts.sampled, (1, MOST))?;
-            count(source, &field("random"), counts.random, (1, MOST))?;
-            count(source, &field("timed"), counts.timed, (1, MOST))?;
+            within(source, &field("whole_up_to"), counts.whole_up_to, (1, MOST))?;
+            within(source, &field("sampled"), counts.sampled, (1, MOST))?;
+            within(source, &field("random"), counts.random, (1, MOST))?;
+            within(source, &field("timed"), counts.timed, (1, MOST))?;
         }
         Ok(())
     }
@@ -349,7 +339,7 @@ impl ContinuitySpec {
             }
         }
         for (name, counts) in [("full", &self.full), ("quick", &self.quick)] {
-            count(source, &field(&format!("{name}.paths")), counts.paths, (1, MOST))?;
+            within(source, &field(&format!("{name}.paths")), counts.paths, (1, MOST))?;
             // Every path has so many.
             let most = MOST / counts.paths;
             if counts.steps < 2 || counts.steps % 2 == 1 || counts.steps > most {
@@ -379,11 +369,11 @@ impl ReachSpec {
         }
         for (name, counts) in [("full", &self.full), ("quick", &self.quick)] {
             let field = |of: &str| format!("study.reach.{name}.{of}");
-            count(source, &field("distances"), counts.distances, (2, MOST))?;
+            within(source, &field("distances"), counts.distances, (2, MOST))?;
             // Every orientation is tried at every distance.
             let most = MOST / counts.distances;
-            count(source, &field("orientations"), counts.orientations, (1, most))?;
-            count(source, &field("cells"), counts.cells, (2, MOST_CELLS))?;
+            within(source, &field("orientations"), counts.orientations, (1, most))?;
+            within(source, &field("cells"), counts.cells, (2, MOST_CELLS))?;
         }
         Ok(())
     }

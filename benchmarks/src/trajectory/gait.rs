@@ -20,9 +20,10 @@ pub use spec::{GaitSpec, GaitTasks, HeightKnot};
 pub use walk::{Swing, Walk};
 
 use super::spline::Curve;
+use super::task_finder::TaskFinder;
 use crate::error::InputError;
 use ik_core::problem::Problem;
-use limb::{Finder, Limb, Waist};
+use limb::{Limb, Waist};
 
 /// Slack of a phase at the ends of a swing, so that a sample at 0.1 Tc counts as standing whatever it was rounded to.
 const PHASE_SLACK: f64 = 1e-9;
@@ -69,7 +70,7 @@ impl Gait {
         spec.check(place, field)?;
         let walk = Walk::new(spec)
             .map_err(|e| InputError::value(place, field, e, "numbers that a spline can pass through"))?;
-        let finder = Finder {
+        let finder = TaskFinder {
             problem,
             place,
             field,

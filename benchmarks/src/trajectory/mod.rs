@@ -7,6 +7,7 @@ mod samples;
 mod shape;
 mod spline;
 mod targets;
+mod task_finder;
 #[cfg(test)]
 mod tests;
 

@@ -10,10 +10,10 @@
 //! Bioloid humanoid. No local link frames enter after the description is made, so this is an independent check of
 //! [`super::forward`]. It allocates; the control step reads the same screws off a page, see [`super::screws`].
 
-use super::root_quaternion;
-use crate::robot::{FrameId, Joint, Motion, Robot, Root};
+use crate::configuration::root_pose;
+use crate::robot::{FrameId, Joint, Motion, Robot};
 use crate::spatial::screw::{Screw, displacement};
-use nalgebra::{Isometry3, Point3, Translation3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 /// The line of a joint in the root frame at the zero pose. The point of a prismatic joint is any point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,12 +90,5 @@ impl<'a> ZeroPose<'a> {
             Motion::Revolute => Screw::revolute(&axis, &(carrier * Point3::from(point)).coords),
             Motion::Prismatic => Screw::prismatic(&axis),
         }
-    }
-}
-
-fn root_pose(robot: &Robot, q: &[f64]) -> Isometry3<f64> {
-    match robot.root() {
-        Root::Fixed => Isometry3::identity(),
-        Root::Floating => Isometry3::from_parts(Translation3::new(q[0], q[1], q[2]), root_quaternion(q)),
     }
 }

@@ -6,9 +6,8 @@ mod postures;
 mod workspace;
 
 use super::style::{BLACK, BLUE, Dash, GREEN, Marker, ORANGE, PURPLE, Style, VERMILLION};
-use super::{Drawn, FigureError, Obstacle, remove_stale};
+use super::{Drawn, FigureError, Obstacle, store};
 use crate::limbs::{Findings, LIMBS_FILE, LimbRow, read_limbs};
-use crate::records_io::write_atomically;
 use std::path::Path;
 
 type Paint = fn(&Limbs<'_>) -> Result<String, Obstacle>;
@@ -45,25 +44,8 @@ pub(super) fn draw(dir: &Path, drawn: &mut Drawn) -> Result<(), FigureError> {
     let has_rows = !rows.is_empty();
     let limbs = Limbs { dir, rows };
     for (name, paint) in FIGURES {
-        let path = dir.join("figures").join(name);
-        match paint(&limbs) {
-            Ok(svg) => {
-                write_atomically(&path, &svg)?;
-                drawn.files.push(path);
-            }
-            Err(Obstacle::NoData(reason)) => {
-                if has_rows {
-                    drawn.notes.push(format!("{name} not drawn: {reason}"));
-                }
-                remove_stale(&path)?;
-            }
-            Err(Obstacle::Record(error)) => return Err(error.into()),
-            Err(Obstacle::Draw(reason)) => {
-                return Err(FigureError::Draw {
-                    figure: name.to_owned(),
-                    reason,
-                });
-            }
+        if let Some(missing) = store(dir, name, paint(&limbs), &mut drawn.files)?.filter(|_| has_rows) {
+            drawn.notes.push(missing);
         }
     }
     Ok(())

@@ -8,6 +8,7 @@
 use super::Gait;
 use crate::error::InputError;
 use crate::trajectory::Trajectory;
+use crate::trajectory::task_finder::TaskFinder;
 use ik_core::kinematics::{Page, forward};
 use ik_core::problem::Problem;
 use ik_core::robot::{FrameId, Motion};
@@ -50,15 +51,7 @@ enum End {
     Hand,
 }
 
-/// Looks up tasks of a walk; `place` and `field` (the path of the table) go into messages.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Finder<'a> {
-    pub(super) problem: &'a Problem,
-    pub(super) place: &'a str,
-    pub(super) field: &'a str,
-}
-
-impl Finder<'_> {
+impl TaskFinder<'_> {
     /// The waist: a task that tracks the pose of a frame of the root body.
     pub(super) fn waist(&self, name: &str) -> Result<Waist, InputError> {
         let task = self.task("waist", name)?;
@@ -105,20 +98,6 @@ impl Finder<'_> {
             return Err(self.wrong(key, name, "a task that tracks a position"));
         };
         self.limb(key, task, frame, waist, End::Hand).map(Some)
-    }
-
-    fn task(&self, key: &str, name: &str) -> Result<usize, InputError> {
-        let tasks = self.problem.tasks();
-        let found = tasks.iter().position(|task| task.name == name);
-        found.ok_or_else(|| {
-            let place = format!("{}: {}.tasks.{key}", self.place, self.field);
-            InputError::unknown(&place, "task", name, tasks.iter().map(|task| &task.name))
-        })
-    }
-
-    fn wrong(&self, key: &str, name: &str, allowed: &str) -> InputError {
-        let field = format!("{}.tasks.{key}", self.field);
-        InputError::value(self.place, &field, format!("`{name}`"), allowed)
     }
 
     fn limb(

@@ -17,6 +17,7 @@ pub use spec::{PreviewSpec, WalkSpec, WalkTasks};
 
 use super::gait::Support;
 use super::samples::Grid;
+use super::task_finder::TaskFinder;
 use crate::error::InputError;
 use crate::referee::Foot;
 use ik_core::problem::{PhaseId, Problem};
@@ -125,7 +126,7 @@ impl PreviewWalk {
                 "weights nearer to each other",
             )
         })?;
-        let finder = Finder {
+        let finder = TaskFinder {
             problem,
             place,
             field,
@@ -212,15 +213,7 @@ impl PreviewWalk {
     }
 }
 
-/// Looks up tasks of a walk; `place` and `field` (the path of the table) go into messages.
-#[derive(Clone, Copy, Debug)]
-struct Finder<'a> {
-    problem: &'a Problem,
-    place: &'a str,
-    field: &'a str,
-}
-
-impl Finder<'_> {
+impl TaskFinder<'_> {
     /// First row and frame of a foot.
     fn foot(&self, key: &str, name: &str) -> Result<(usize, FrameId), InputError> {
         let task = self.task(key, name)?;
@@ -250,20 +243,6 @@ impl Finder<'_> {
             Track::Position(_) | Track::Pose(_) => Ok(Some(self.problem.slots()[task].xdot)),
             _ => Err(self.wrong("carried", name, "a task that tracks a position or a pose")),
         }
-    }
-
-    fn task(&self, key: &str, name: &str) -> Result<usize, InputError> {
-        let tasks = self.problem.tasks();
-        let found = tasks.iter().position(|task| task.name == name);
-        found.ok_or_else(|| {
-            let place = format!("{}: {}.tasks.{key}", self.place, self.field);
-            InputError::unknown(&place, "task", name, tasks.iter().map(|task| &task.name))
-        })
-    }
-
-    fn wrong(&self, key: &str, name: &str, allowed: &str) -> InputError {
-        let field = format!("{}.tasks.{key}", self.field);
-        InputError::value(self.place, &field, format!("`{name}`"), allowed)
     }
 
     /// The phases that hang the robot on each of the feet; the only one there is if the problem names no supports.

@@ -3,10 +3,11 @@
 use super::plan::Target;
 use super::rates::{centre_of_mass_rate, is_regular, joint_rates};
 use super::region::{Halfspace, Reach, Region, Ring};
-use super::whole_body::{Candidate, Free, OUTSIDE_RAD, Step, Work, conclude, root_pose};
+use super::whole_body::{Candidate, Free, OUTSIDE_RAD, Step, Work, conclude};
+use ik_core::configuration::root_pose;
 use ik_core::evaluator::Evaluator;
 use ik_core::formulation::Termination;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// A centre of mass this near (m) is met.
 const MET_M: f64 = 1e-11;
@@ -28,6 +29,44 @@ enum Way {
     Best,
 }
 
+/// The centre of mass as a linear function of the root's position, about a candidate.
+struct Linear {
+    origin: Vector3<f64>,
+    /// From the target of the centre of mass (m).
+    away: Vector3<f64>,
+    /// D, and its inverse if it is well conditioned.
+    rate: Matrix3<f64>,
+    inverse: Option<Matrix3<f64>>,
+}
+
+impl Linear {
+    /// Where the root may go next, and the centre of mass that is predicted to be left there (m).
+    ///
+    /// Heuristic: next to a straight leg D is dominated by how fast its knee bends, and Newton steps that lead out of the
+    /// region throw the waist about (measured, they lose coman/asymmetric). There the waist first tries to go with the centre
+    /// of mass to the nearest point of the region.
+    fn next(&self, way: Way, region: &Region) -> (Vector3<f64>, Vector3<f64>) {
+        let (origin, away) = (self.origin, self.away);
+        let along = || {
+            let target = region.nearest(&(origin + away));
+            (target, away - (target - origin))
+        };
+        let Some(inverse) = &self.inverse else {
+            return along();
+        };
+        let newton = origin + inverse * away;
+        match way {
+            _ if region.contains(&newton) => (newton, Vector3::zeros()),
+            Way::Along => along(),
+            Way::Best => {
+                let best = origin + region.best_motion(&away, &origin, inverse);
+                let target = region.nearest(&best);
+                (target, away - self.rate * (target - origin))
+            }
+        }
+    }
+}
+
 impl Step<'_> {
     /// Newton's method on the position of the root, kept where the limbs reach.
     pub(super) fn balance(
@@ -44,7 +83,7 @@ impl Step<'_> {
         start.q.copy_from_slice(self.step.q_prev);
         start.merit.away = centre - start.page.centre_of_mass();
         let ahead = work.best.merit.away;
-        let (newton, _) = self.next(Way::Along, &work.best, &mut work.region);
+        let (newton, _) = self.linear(&work.best).next(Way::Along, &work.region);
         for length in FIRST_LENGTHS {
             let guess = length.map_or(newton, |part| work.region.nearest(&(before + ahead * part)));
             self.evaluate(guess, centre, Free::Rests, work, eval);
@@ -87,30 +126,14 @@ impl Step<'_> {
         improves
     }
 
-    /// Where the root may go next from a candidate, and the centre of mass that is predicted to be left there (m).
-    ///
-    /// Heuristic: next to a straight leg D is dominated by how fast its knee bends, and Newton steps that lead out of the
-    /// region throw the waist about (measured, they lose coman/asymmetric). There the waist first tries to go with the centre
-    /// of mass to the nearest point of the region.
-    fn next(&self, way: Way, from: &Candidate, region: &mut Region) -> (Vector3<f64>, Vector3<f64>) {
-        let (origin, away) = (from.origin, from.merit.away);
-        let along = || {
-            let target = region.nearest(&(origin + away));
-            (target, away - (target - origin))
-        };
-        let rate = centre_of_mass_rate(self.robot, self.plan, from);
-        let Some(inverse) = rate.try_inverse().filter(|_| is_regular(&rate)) else {
-            return along();
-        };
-        let newton = origin + inverse * away;
-        match way {
-            _ if region.contains(&newton) => (newton, Vector3::zeros()),
-            Way::Along => along(),
-            Way::Best => {
-                let best = origin + region.best_motion(&away, &origin, &inverse);
-                let target = region.nearest(&best);
-                (target, away - rate * (target - origin))
-            }
+    /// How the centre of mass moves with the root near a candidate.
+    fn linear(&self, at: &Candidate) -> Linear {
+        let rate = centre_of_mass_rate(self.robot, self.plan, at);
+        Linear {
+            origin: at.origin,
+            away: at.merit.away,
+            rate,
+            inverse: rate.try_inverse().filter(|_| is_regular(&rate)),
         }
     }
 
@@ -119,32 +142,36 @@ impl Step<'_> {
     fn improve(&self, centre: &Vector3<f64>, work: &mut Work, eval: &mut Evaluator) -> bool {
         let from = work.best.origin;
         let merit = work.best.merit;
-        if !merit.stands() {
+        let linear = merit.stands().then(|| self.linear(&work.best));
+        if linear.is_none() {
             self.cut(&work.best, &mut work.region);
         }
         for way in [Way::Along, Way::Best] {
-            let mut lengths = LENGTHS.iter();
-            let mut cuts = 0;
-            loop {
-                let (target, predicted) = if merit.stands() {
-                    self.next(way, &work.best, &mut work.region)
-                } else {
-                    (work.region.nearest(&from), Vector3::zeros())
+            'cuts: for cuts in 0..=MOST_CUTS {
+                let target = match &linear {
+                    Some(linear) => {
+                        let (target, left) = linear.next(way, &work.region);
+                        let gains = left.norm() < (1.0 - LEAST_GAIN) * merit.away.norm();
+                        if !gains {
+                            break;
+                        }
+                        target
+                    }
+                    None => work.region.nearest(&from),
                 };
-                let gains = !merit.stands() || predicted.norm() < (1.0 - LEAST_GAIN) * merit.away.norm();
-                let Some(length) = lengths.next().filter(|_| gains) else {
-                    break;
-                };
-                self.evaluate(from + (target - from) * *length, centre, Free::Rests, work, eval);
-                if work.trial.merit.is_better_than(&work.best.merit) {
-                    std::mem::swap(&mut work.trial, &mut work.best);
-                    return true;
+                for length in LENGTHS {
+                    self.evaluate(from + (target - from) * length, centre, Free::Rests, work, eval);
+                    if work.trial.merit.is_better_than(&work.best.merit) {
+                        std::mem::swap(&mut work.trial, &mut work.best);
+                        return true;
+                    }
+                    let leaves = work.trial.merit.missing_m == 0.0 && !work.trial.merit.stands();
+                    if leaves && cuts < MOST_CUTS {
+                        self.cut(&work.trial, &mut work.region);
+                        continue 'cuts;
+                    }
                 }
-                if work.trial.merit.missing_m == 0.0 && !work.trial.merit.stands() && cuts < MOST_CUTS {
-                    self.cut(&work.trial, &mut work.region);
-                    lengths = LENGTHS.iter();
-                    cuts += 1;
-                }
+                break;
             }
         }
         false

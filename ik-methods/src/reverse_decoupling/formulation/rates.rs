@@ -1,8 +1,9 @@
 //! How joints and the centre of mass move with the waist while the ends of all limbs are held.
 
 use super::plan::{LimbPlan, Plan, Target};
-use super::whole_body::{Candidate, root_pose};
+use super::whole_body::Candidate;
 use crate::reverse_decoupling::analyser::End;
+use ik_core::configuration::root_pose;
 use ik_core::kinematics::Page;
 use ik_core::kinematics::screws::for_each_screw;
 use ik_core::robot::Robot;

@@ -136,8 +136,6 @@ pub(super) struct Region {
     rings: Vec<Ring>,
     /// Cuts with the joint coordinate they belong to.
     cuts: Vec<(usize, Halfspace)>,
-    /// Halfspaces of [`Region::best_motion`].
-    linearised: Vec<Halfspace>,
 }
 
 impl Region {
@@ -147,7 +145,6 @@ impl Region {
             shells: Vec::with_capacity(limbs),
             rings: Vec::with_capacity(limbs),
             cuts: Vec::with_capacity(MOST_CUTS),
-            linearised: Vec::with_capacity(4 * limbs + MOST_CUTS),
         }
     }
 
@@ -220,28 +217,22 @@ impl Region {
     /// The motion dx from `origin` that comes nearest to `D dx = wanted` within cuts, and shells and rings in linear
     /// approximation; `inverse` is that of D.
     pub(super) fn best_motion(
-        &mut self,
+        &self,
         wanted: &Vector3<f64>,
         origin: &Vector3<f64>,
         inverse: &Matrix3<f64>,
     ) -> Vector3<f64> {
-        let mut linearised = std::mem::take(&mut self.linearised);
-        linearised.clear();
-        linearised.extend(self.conditions(*origin).map(|condition| {
+        let caused = |condition: Condition| {
             let plane = condition.linearised(origin);
             // n · dx = (D⁻ᵀ n) · (D dx)
             let n = inverse.tr_mul(&plane.n);
             let norm = n.norm();
-            Halfspace {
+            Condition::Below(Halfspace {
                 n: n / norm,
                 h: (plane.h - plane.n.dot(origin)) / norm,
-            }
-        }));
-        let caused = project(wanted, |_| {
-            linearised.iter().map(|plane| Condition::Below(*plane))
-        });
-        self.linearised = linearised;
-        inverse * caused
+            })
+        };
+        inverse * project(wanted, |_| self.conditions(*origin).map(caused))
     }
 
     /// The point nearest to `target` in the region, as far as the rounds of [`project`] lead; best effort where it is empty.
@@ -496,7 +487,7 @@ mod tests {
     fn the_best_motion_is_nearest_in_what_it_causes() {
         let numbers = &mut numbers(8);
         for _ in 0..100 {
-            let mut region = region(numbers);
+            let region = region(numbers);
             let wanted = vector(numbers);
             let rate =
                 Matrix3::identity() + Matrix3::from_fn(|_, _| 0.4 * numbers.next().unwrap_or_default());

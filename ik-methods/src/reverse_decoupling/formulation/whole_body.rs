@@ -3,12 +3,13 @@
 use super::plan::{LimbPlan, Plan, Target, Waist};
 use super::region::Region;
 use crate::reverse_decoupling::{Unsolved, wrap};
+use ik_core::configuration::root_pose;
 use ik_core::evaluator::Evaluator;
 use ik_core::formulation::Termination;
 use ik_core::kinematics::Page;
 use ik_core::robot::{Robot, Root};
 use ik_core::step::{Bounds, ControlStep};
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
 /// Joints this far (rad) outside their interval are within rounding of it and clamped.
@@ -368,20 +369,6 @@ fn turned_inside(motion: f64, lo: f64, hi: f64) -> (f64, f64) {
         }
     }
     best
-}
-
-/// Pose of the root body.
-pub(super) fn root_pose(robot: &Robot, q: &[f64]) -> Isometry3<f64> {
-    match robot.root() {
-        Root::Fixed => Isometry3::identity(),
-        Root::Floating => {
-            let turn = Quaternion::new(q[6], q[3], q[4], q[5]);
-            Isometry3::from_parts(
-                Translation3::new(q[0], q[1], q[2]),
-                UnitQuaternion::new_unchecked(turn),
-            )
-        }
-    }
 }
 
 #[cfg(test)]
